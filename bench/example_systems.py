@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier import falsify
-from falsifier.core.model import Experiment, FunctionModel, Kind, ModelInfo, Variable
+from falsifier.core.function_model import FunctionModel
+from falsifier.core.model import Experiment, Kind, ModelInfo, Variable
 from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement

@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
+from falsifier.core.function_model import FunctionModel
+from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
 from falsifier.engines.protocol import Engine

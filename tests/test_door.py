@@ -173,6 +173,8 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         lambda: untyped.System({3: "a.fmu"}),
         "components: expected names of FMUs that are texts, got 3",
     ),
+    "nothing as a component": (lambda: untyped.Component(None), "fmu: expected the path of an FMU, got None"),
+    "nothing to load": (lambda: untyped.analysis.load(None), "directory: expected a path, got None"),
     "a number as a system's name": (
         lambda: untyped.System({"a": "a.fmu"}, name=3),
         "name: expected a text, got 3",

@@ -198,6 +198,7 @@ def assess(
         raise SimulationError(f"{problem.name}: every simulation failed; the last error: {drawn[-1].reason}")
     violations, failures = sum(e.violated for e in drawn), len(drawn) - len(judged)
     each = (1.0 + confidence) / 2.0
+    is_all = problem.space.candidates == len({e.candidate.key for e in drawn})
     return Assurance(
         problem=problem,
         distribution=_distribution_text(problem.space),
@@ -212,7 +213,7 @@ def assess(
         ),
         smallest=min(judged, key=_robustness),
         searched=_told(searched, doubtful, problem.space),
-        findings=() if violations else vacuity.findings(),
+        findings=() if violations else vacuity.findings(is_all=is_all),
         interrupted=interrupted,
     )
 

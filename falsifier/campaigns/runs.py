@@ -5,11 +5,13 @@ A search shared by several requirements appears as one run per requirement.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from falsifier.campaigns.directory import is_campaign, read_campaign, run_directories
 from falsifier.campaigns.request import Method, method_of, method_of_run
+from falsifier.core.arguments import path_of
 from falsifier.counterexamples.store import file_of
 from falsifier.problem.source import STL_NAME
 from falsifier.record import manifest as manifests
@@ -112,13 +114,14 @@ class Run(RunProgress):
         return as_frame(self.columns())
 
 
-def load(directory: str | Path) -> list[Run]:
+def load(directory: str | PathLike[str]) -> list[Run]:
     """Load all runs of a campaign, of a run directory, or of a folder of run directories.
 
     Raises:
         JournalError: if the directory is none of these, or a file in it is invalid.
+        SpecError: if it is not a path.
     """
-    places = run_directories(Path(directory))
+    places = run_directories(path_of("directory", directory))
     runs = [run for place in places for run in RunFollower(place, unread_runs(place)).look()]
     formulas: dict[str, dict[str, None]] = {}
     for run in runs:
@@ -129,9 +132,9 @@ def load(directory: str | Path) -> list[Run]:
     return runs
 
 
-def not_begun(directory: str | Path, begun: Sequence[Run]) -> list[RunProgress]:
+def not_begun(directory: str | PathLike[str], begun: Sequence[Run]) -> list[RunProgress]:
     """Return the runs of a campaign that have not begun, which tables count beside those that have."""
-    place, known = Path(directory), {run.directory.name for run in begun}
+    place, known = path_of("directory", directory), {run.directory.name for run in begun}
     names = {run.request.problems[0]: run.requirement for run in begun if run.request.problems}
     left = [run for run in requested_runs(place) if run.name not in known] if is_campaign(place) else []
     return [replace(run, requirement=names.get(run.request.problems[0], run.requirement)) for run in left]
@@ -145,7 +148,7 @@ def requested_runs(directory: Path) -> list[RunProgress]:
     ]
 
 
-def load_run(directory: str | Path, requirement: str | None = None) -> Run:
+def load_run(directory: str | PathLike[str], requirement: str | None = None) -> Run:
     """Load one run directory; trajectories stay on disk.
 
     Args:
@@ -154,8 +157,9 @@ def load_run(directory: str | Path, requirement: str | None = None) -> Run:
 
     Raises:
         JournalError: if a file is invalid, or several requirements share the search and none is named.
+        SpecError: if the directory is not a path.
     """
-    place = Path(directory)
+    place = path_of("directory", directory)
     name = manifests.read(place).of(requirement).requirement.name
     (run,) = (run for run in RunFollower(place, unread_runs(place)).look() if run.requirement == name)
     return run

@@ -18,7 +18,7 @@ from falsifier.core.words import candidate_facts, counted, in_one_line
 from falsifier.counterexamples.case import Case, case_of, counterexample_case
 from falsifier.counterexamples.explain import explain as explain_case
 from falsifier.counterexamples.export import export_counterexample
-from falsifier.counterexamples.export.scripts import unplayable
+from falsifier.counterexamples.export.scripts import replay_notes
 from falsifier.counterexamples.export.tables import input_table, write_csv
 from falsifier.counterexamples.regression import Database
 from falsifier.counterexamples.robustness_map import BUDGET as MAP_BUDGET, robustness_map
@@ -165,8 +165,8 @@ def export(*, run: Path, out: Path | None, store: Path | None, **rights: Any) ->
             written = [Database(store).save(problem, stored)]
         else:
             written = export_counterexample(problem, stored, evaluation, directory)
-            if refusal := unplayable(problem.model):
-                warn(f"replay.py: {refusal}")
+            for note in replay_notes(problem.model):
+                warn(f"replay.py: {note}")
     say("\n".join(map(str, written)))
 
 

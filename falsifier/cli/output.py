@@ -5,11 +5,8 @@ Results go to stdout; messages for people go to stderr through ``views.terminal`
 
 import json
 import os
-import re
-import shutil
 import signal
 import sys
-import textwrap
 from contextlib import suppress
 from time import monotonic
 from types import FrameType
@@ -36,15 +33,8 @@ def say(text: str, *, nl: bool = True) -> None:
 
 
 def as_shown(text: str, content: object, *, as_json: bool) -> str:
-    """Return a result as text, whose long facts are wrapped on a terminal, or its content as JSON.
-
-    Names of files are not wrapped: what is copied from a terminal must be a name.
-    """
-    if as_json or not sys.stdout.isatty():
-        return json.dumps(content, indent=2) if as_json else text
-    wrapper = textwrap.TextWrapper(shutil.get_terminal_size().columns, subsequent_indent=" " * 17)
-    wrapper.break_long_words = wrapper.break_on_hyphens = False
-    return re.sub(r"(?m)^ {2}(?!files |picture ).{14} \S.*$", lambda fact: wrapper.fill(fact[0]), text)
+    """Return a result as text, or its content as JSON."""
+    return json.dumps(content, indent=2) if as_json else text
 
 
 def conclude(text: str, code: int, *, nl: bool = True) -> NoReturn:

@@ -105,7 +105,8 @@ class InputRange(Range):
         description: its meaning, from the model.
         kind: type of its values; every type except real has integer values, held between control points.
         items: names and numbers of an enumeration's items.
-        control_points: number of evenly spaced control points of the fixed parameterization.
+        control_points: number of evenly spaced control points of the fixed parameterization, at most that of
+            a free one.
         interpolation: interpolation between the control points.
         hold: sample-and-hold period in s, or None.
         free: limits of a free parameterization, or None if only the fixed one is allowed.
@@ -129,6 +130,11 @@ class InputRange(Range):
             positive(f"{self.label}: hold", self.hold)
         if self.free is not None:
             instance(f"{self.label}: free", self.free, Freedom, "Freedom(max_control_points, min_interval)")
+            if self.control_points > (most := self.free.max_control_points):
+                raise SpecError(
+                    f"{self.label}: {self.control_points} control points are more than free allows: state "
+                    f"control_points of at most {most}, or a larger max_control_points"
+                )
 
 
 @dataclass(frozen=True, slots=True)

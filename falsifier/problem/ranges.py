@@ -113,14 +113,16 @@ def _input_range(variable: Variable, section: InputSection) -> InputRange:
         raise SpecError(
             f'values of type {variable.kind} cannot be interpolated; use "constant"', key="interpolation"
         )
+    free = Freedom(**section.free.model_dump()) if section.free else None
+    usual = min(DEFAULT_POINTS, free.max_control_points) if free else DEFAULT_POINTS
     return InputRange(
         variable.name,
         low,
         high,
-        control_points=section.control_points or DEFAULT_POINTS,
+        control_points=section.control_points or usual,
         interpolation=interpolation,
         hold=section.hold,
-        free=Freedom(**section.free.model_dump()) if section.free else None,
+        free=free,
         unit=variable.unit,
         description=variable.description,
         kind=value_kind(variable),

@@ -3,7 +3,6 @@
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from math import ceil, floor
 from os.path import relpath
 from pathlib import Path
@@ -18,7 +17,7 @@ from falsifier.core.literals import one_line, toml_key
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import in_unit
 from falsifier.errors import FormulaError, SpecError
-from falsifier.fmu import is_package, read_info, read_package, with_paths
+from falsifier.fmu import is_package, read_info, read_package
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.joining import join
 from falsifier.problem.loading import find_spec
@@ -26,7 +25,6 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import DEFAULT_POINTS
 from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
 from falsifier.problem.sections import RequirementSection
-from falsifier.problem.shorthand import named_file
 from falsifier.problem.source import MODEL_FILES
 from falsifier.problem.spec import parse_spec, read_spec
 from falsifier.stl import Formula, parse
@@ -254,54 +252,17 @@ def problem_of_starter(text: str, path: Path, name: str = "", *, searches: bool 
     return Problem.of(join(spec, name or next(iter(others)), path=path, searches=searches))
 
 
-def _relocate(document: tomlkit.TOMLDocument, subject: Subject, out: Path) -> None:
-    """Change the relative paths in a spec to those from another file's folder."""
-    folder = subject.path.parent
-    strings = {v.name for v in subject.problem.info.variables if v.kind == "string"}
-
-    def moved(named: str) -> str:
-        if Path(named).is_absolute():
-            return named
-        there = folder / named
-        # Only with a slash a text names a folder.
-        return seen_from(out, there).as_posix() + "/" * there.is_dir()
-
-    for section in (document.get("model", {}), *document.get("components", {}).values()):
-        if "fmu" in section:
-            section["fmu"] = moved(str(section["fmu"]))
-    for section in _layers(document):
-        if "allow" in section:
-            words, at = section["allow"], partial(with_paths, change=lambda path: moved(str(path)))
-            section["allow"] = [word if ":~" in word else at([word])[0] for word in words]
-        parameters: Any = section.get("parameters", {})
-        for name in strings & parameters.keys():
-            found: Any = parameters[name]
-            table, key = (found, "value") if isinstance(found, dict) else (parameters, name)
-            text = str(table.get(key, ""))
-            if named_file(text, folder) != text:
-                table[key] = moved(text)
-    context: Any = document.get("context", {})
-    files = list(context.get("files", ()))
-    for key in context.keys() & {"files", "checked"}:  # a file within an FMU is named after that
-        context[key] = [moved(name) if name in files else name for name in context[key]]
-
-
-def _layers(document: Mapping[str, Any]) -> Iterator[Any]:
-    """Return all tables of a spec in which rights and parameters may stand."""
-    yield from (document, document.get("model", {}), *document.get("requirements", {}).values())
-    for profile in document.get("profiles", {}).values():
-        yield from (profile, *profile.get("requirements", {}).values())
-
-
 def with_requirement(subject: Subject, out: Path, formula: str, *, description: str) -> tuple[str, str]:
     """Return the spec's text with one more requirement, and its name; comments are kept.
 
-    The name is the first free one of R1, R2, ... Relative paths become those from the folder of ``out``, to
-    which the text will be written.
+    The name is the first free one of R1, R2, ... The paths of FMUs become those from the folder of ``out``,
+    to which the text will be written.
     """
     document = tomlkit.parse(subject.text)
     if subject.path.parent.resolve() != out.resolve().parent:
-        _relocate(document, subject, out)
+        for section in (document.get("model", {}), *document.get("components", {}).values()):
+            if "fmu" in section:
+                section["fmu"] = seen_from(out, subject.path.parent / str(section["fmu"])).as_posix()
     requirements: Any = document["requirements"]
     if subject.is_started:
         del requirements[_STARTED]

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,9 +9,8 @@ from falsifier.core.literals import toml_key
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
-from falsifier.errors import FalsifierError, written
+from falsifier.errors import written
 from falsifier.problem.grid import default_freedom, smallest_window
-from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.sections import FreeSection
 from falsifier.problem.source import Parameterization
@@ -130,21 +128,13 @@ def _fastest(r: InputRange, space: SearchSpace) -> str:
 
 def _way(problem: Problem, coarse: Sequence[str], limits: FreeSection) -> str:
     """Say what makes inputs free; empty if all of them are, and the engine alone does not use it."""
-
-    def are_free(found: Problem) -> bool:
-        return all(r.free for r in found.space.inputs if r.name in coarse)
-
     source, count, shortest = problem.source, limits.max_control_points, limits.min_interval
-    if are_free(problem):
+    if all(r.free for r in problem.space.inputs if r.name in coarse):
         return ""
     if source is None:
         return f"InputRange(..., free=Freedom({count}, {shortest:g}))"
     option = written(f"--parameterization free:{shortest:g}", f"shortest_piece={shortest:g}")
-    if source.parameterization == "fixed":
-        with suppress(FalsifierError, OSError):  # its files may have changed since
-            if are_free(load_source(source.model_copy(update={"parameterization": "free"}))):
-                return written("--parameterization free", "parameterization='free'")
-    elif source.parts.kind == "spec":
+    if source.parameterization != "fixed" and source.parts.kind == "spec":
         places = " and ".join(f"[inputs.{toml_key(name)}]" for name in coarse)
         option += f", or free = {{ max_control_points = {count}, min_interval = {shortest:g} }} in {places}"
     return option

@@ -170,7 +170,7 @@ class _Loop:
             limit = self.limit_reached()
             if limit is not None:
                 return limit
-            if len(self.simulated) == self.most and self.count >= self.steps.replayed:
+            if self.is_all and self.count >= self.steps.replayed:
                 return f"the whole search space was simulated, {counted(int(self.most), 'candidate')}"
             if self.count >= _MAX_INITIAL_FAILURES and self.all_failed():
                 return self.failure_text()
@@ -181,6 +181,11 @@ class _Loop:
                 self.last_defect = str(reached.__cause__ or self.last_defect)
                 return self.failure_text() if self.all_failed() else str(reached)
         return "all requirements are falsified"
+
+    @property
+    def is_all(self) -> bool:
+        """Whether every candidate of the search space was simulated."""
+        return len(self.simulated) == self.most
 
     def limit_reached(self) -> str | None:
         """Which limit is reached, in words.
@@ -358,8 +363,9 @@ class _Loop:
 
     def end(self, status: ResultStatus, reason: str) -> list[Result]:
         """Announce the end; return one result per requirement."""
+        used, directory, is_all = self.used, self.directory, self.is_all
         results = [
-            state.result(status, reason, used=self.used, spent=self.clock(), directory=self.directory)
+            state.result(status, reason, used=used, spent=self.clock(), directory=directory, is_all=is_all)
             for state in self.states
         ]
         overall = "falsified" if all(r.falsified for r in results) else status

@@ -139,15 +139,17 @@ class RequirementState:
         used: Parameterization,
         spent: Spent,
         directory: Path | None,
+        is_all: bool,
     ) -> Result:
         """Return the result for this requirement of a search that has ended.
 
-        ``spent`` is the whole search's. A requirement that was falsified has its own status and reason.
+        ``spent`` is the whole search's, ``is_all`` says that the whole search space was simulated. A
+        requirement that was falsified has its own status and reason.
         """
         found, findings = self.counterexample, list[Finding]()
         if self.best is not None and found is None:
             limits = inexpressible(self.problem, used)
-            findings = [*self.vacuity.findings(), *([limits] if limits else [])]
+            findings = [*self.vacuity.findings(is_all=is_all), *([limits] if limits else [])]
         return Result(
             problem=self.problem,
             status=status if found is None else "falsified",

@@ -96,11 +96,14 @@ class Vacuity:
             if found.high > seen.highest.margin:
                 seen.highest = _Extreme(found.high, simulation, found.highest, trajectory.at(found.highest))
 
-    def findings(self) -> tuple[Finding, ...]:
-        """Return what was not tested by any simulation so far; the most important first."""
+    def findings(self, *, is_all: bool) -> tuple[Finding, ...]:
+        """Return what was not tested by any simulation so far; the most important first.
+
+        ``is_all`` says that the whole search space was simulated, so that no more simulations can help.
+        """
         if not self._count:
             return ()
-        constant = tuple(self._constant())
+        constant = tuple(self._constant(is_all=is_all))
         never = [p for p in self._parts if isinstance(p.formula, Implies) and p.highest.margin < 0]
         always = [p for p in self._parts if isinstance(p.formula, Or) and p.lowest.margin > 0]
         said = {predicate for part in never for predicate in part.part.predicates}
@@ -123,7 +126,7 @@ class Vacuity:
     def _in_all(self) -> str:
         return f"in {counted(self._count, 'simulation')}" if self._count > 1 else "in the only simulation"
 
-    def _constant(self) -> Iterator[Finding]:
+    def _constant(self, *, is_all: bool) -> Iterator[Finding]:
         """Tell that the robustness never changed, unless steps of whole numbers explain that."""
         info, signals = self._problem.info, self._problem.requirement.formula.signals
         if self._count < _FEWEST or len(self._robustness) > 1 or not signals:
@@ -132,14 +135,14 @@ class Vacuity:
         if not self._moved:
             text = (
                 f"Nothing that was searched had an effect on {listed(signals)}: the same {self._in_all}, "
-                f"with robustness {signed(value)}. Search longer, or search inputs and "
-                f"parameters on which {'it depends' if len(signals) == 1 else 'they depend'}."
+                f"with robustness {signed(value)}. Search {'' if is_all else 'longer, or search '}"
+                f"inputs and parameters on which {'it depends' if len(signals) == 1 else 'they depend'}."
             )
         elif all(name in info and info[name].kind == "real" for name in signals):
             text = (
                 f"The robustness was {signed(value)} {self._in_all}, although "
                 f"{listed(sorted(self._moved))} changed: the value that decides it was the same each "
-                "time. Search longer, or vary more."
+                f"time. {'Vary more' if is_all else 'Search longer, or vary more'}."
             )
         else:
             return

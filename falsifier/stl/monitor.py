@@ -18,6 +18,9 @@ from falsifier.stl.diagnosis import Diagnosis, diagnose, path_to_decider
 from falsifier.stl.formula import Formula, Implies, Or, Predicate
 from falsifier.stl.program import CompiledPart, Program, fill, fill_many
 
+# Maximum number of signals of which a verdict keeps the values, unless the formula has more.
+_MOST_VALUES = 40
+
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
@@ -28,7 +31,8 @@ class Verdict:
             is given as -1e-300 if the requirement is violated, and as 1e-300 if it holds.
         critical_time: time in s that decided the value.
         predicate: text of the deciding predicate.
-        values: signal values at the critical time, by name.
+        values: signal values at the critical time, by name; of more than 40 signals those of the formula, and
+            as many others as make 40: there is a verdict for each requirement and simulation.
         breach: what broke; None if nothing did.
     """
 
@@ -120,7 +124,11 @@ class Monitor:
         self._spare.append(buffer)
         decider, sample = path[-1].part, path[-1].sample
         time = trajectory.times.item(sample)
-        values = {name: float(column.item(sample)) for name, column in trajectory.columns.items()}
+        columns, signals = trajectory.columns, self.formula.signals
+        names = list(columns)
+        if len(names) > _MOST_VALUES:
+            names = [*dict.fromkeys((*signals, *names))][: max(_MOST_VALUES, len(signals))]
+        values = {name: float(columns[name].item(sample)) for name in names}
         for name, value in values.items():
             if not isfinite(value):
                 raise MonitorError(f"signal {name!r} is {value} at {time:g} s")

@@ -1,6 +1,5 @@
 """HTML markup; plain text is escaped automatically."""
 
-import re
 from base64 import b64encode
 from collections.abc import Iterable
 from html import escape
@@ -8,7 +7,6 @@ from typing import Literal
 
 from falsifier.core.literals import plain
 
-_OPTION = re.compile(r"(?<!\S)--[a-z]+(?:-[a-z]+)*")
 _VOID = frozenset({"br", "hr", "img", "input", "link", "meta"})
 # Notebook front ends align table cells to the right by default.
 _LEFT = "text-align: left"
@@ -39,11 +37,6 @@ def el(tag: str, *children: str, **attributes: str | float | None) -> Html:
 def join(*parts: str) -> Html:
     """Concatenate parts; those that are not Html are escaped."""
     return Html("".join(part if isinstance(part, Html) else _escaped(part) for part in parts))
-
-
-def whole_options(text: str) -> Html:
-    """Escape a text whose lines do not end within the name of an option, as they do at other hyphens."""
-    return Html(_OPTION.sub(r'<span class="option">\g<0></span>', _escaped(text)))
 
 
 def table(

@@ -11,7 +11,7 @@ from falsifier.core.words import counted, readable
 from falsifier.fmu import watching
 from falsifier.problem.problem import held_text
 from falsifier.search import events
-from falsifier.search.budget import Budget, Spent
+from falsifier.search.budget import Budget
 from falsifier.search.findings import cause_of
 from falsifier.search.parameterization import parameterization_note
 from falsifier.stl.margins import signed
@@ -51,16 +51,21 @@ def progress() -> events.Listener:
     console = error_console()
     if console.is_jupyter:  # rich's own live display would need widgets there
         return _Line(_show_in_notebook, keep=None)  # there is no place for more lines
-    news, write = News(), line_writer(console)
+    write, since, is_told = line_writer(console), 0.0, False
 
-    def show(event: events.Event) -> None:
-        told = news.lines(event)
-        if isinstance(event, events.Evaluated):
-            told += news.pace(event.spent, told=bool(told))
-        for line in told:
-            write(line)
+    def keep(news: str) -> None:
+        nonlocal is_told
+        is_told = True
+        write(news)
 
-    return unbroken(show)
+    def show(line: _Line) -> None:
+        nonlocal since, is_told
+        is_due = line.seconds - since >= max(_QUIET, _QUIET_SHARE * line.seconds)
+        if is_due and not is_told:
+            write(line.text.strip())
+        since, is_told = line.seconds if is_due or is_told else since, False
+
+    return unbroken(_Line(show, keep))
 
 
 def _show_in_notebook(line: "_Line") -> None:
@@ -85,6 +90,7 @@ class _Line:
         title: the requirements and the engine.
         total: maximum number of simulations; None without a limit.
         done: number of simulations so far.
+        seconds: time that they took in s; 0 at the end.
         handle: where it is shown in a notebook.
     """
 
@@ -95,15 +101,15 @@ class _Line:
     def _begin(self, title: str, budget: Budget) -> None:
         self.title, self.total, self.done = title, budget.simulations, 0
         self.handle: Any = None
-        self._seconds, self._most, self._note = 0.0, budget.seconds or inf, ""
+        self.seconds, self._most, self._note = 0.0, budget.seconds or inf, ""
 
     @property
     def text(self) -> str:
         """How far it is, and the latest news."""
         of = f"{self.done} of " if self.total else ""
         count = counted(self.total or self.done, "simulation")
-        each, more = self._seconds / max(1, self.done), (self.total or 0) - self.done
-        left = min(each * more, self._most - self._seconds)
+        each, more = self.seconds / max(1, self.done), (self.total or 0) - self.done
+        left = min(each * more, self._most - self.seconds)
         rest = f", about {_duration(left)} left" if left >= 1 else ""
         return f"{of}{count}{rest}. {self._note}"
 
@@ -121,11 +127,11 @@ class _Line:
             case events.Asked():
                 return
             case events.Evaluated(spent=spent):
-                self.done, self._seconds = spent.simulations, spent.seconds
+                self.done, self.seconds = spent.simulations, spent.seconds
             case events.Exchanged(spent=spent):
                 self._note = f"LLM replied, {spent.tokens} tokens so far"
             case events.RunEnded():
-                self._seconds, self._note = 0.0, f"{event.status}; {self._note}"  # no time is left
+                self.seconds, self._note = 0.0, f"{event.status}; {self._note}"  # no time is left
         self._show(self)
 
 
@@ -136,13 +142,12 @@ class News:
         self._started: events.RunStarted | None = None
         self._told: set[str] = set()
         self._least: dict[str, float] = {}
-        self._since = Spent()
 
     def lines(self, event: events.Event) -> list[str]:
         """Return all that is new: choices, improvements, causes of failures, warnings and confirmations."""
         match event:
             case events.RunStarted():
-                self._started, self._told, self._least, self._since = event, set(), {}, Spent()
+                self._started, self._told, self._least = event, set(), {}
                 known = counted(event.replayed, "evaluation")
                 replayed = f", {known} from the journal" if event.replayed else ""
                 formulas = (f"{problem.name}: {problem.requirement.formula}" for problem in event.problems)
@@ -185,23 +190,6 @@ class News:
         is_new = key not in self._told
         self._told.add(key)
         return is_new
-
-    def pace(self, spent: Spent, *, told: bool) -> Iterator[str]:
-        """Tell how fast the search is and what is left of it, if nothing else was told for a while."""
-        quiet = spent.seconds - self._since.seconds
-        if told or quiet < max(_QUIET, _QUIET_SHARE * spent.seconds):
-            self._since = spent if told else self._since
-            return
-        budget = self._started.budget if self._started else Budget()
-        rate = (spent.simulations - self._since.simulations) / quiet
-        self._since = spent
-        most = budget.simulations
-        left = [] if most is None else [(most - spent.simulations) / rate]
-        left += [] if budget.seconds is None else [budget.seconds - spent.seconds]
-        of = "" if most is None else f" of {most}"
-        pace = f"{rate:.3g} per s" if rate >= 1 else f"{1 / rate:.3g} s each"
-        rest = f", about {_duration(max(0.0, min(left)))} left at most" if left else ""
-        yield f"simulation {spent.simulations}{of}: nothing better; {pace}{rest}"
 
 
 def log_fmu(path: Path) -> events.Listener:

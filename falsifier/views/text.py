@@ -19,15 +19,13 @@ from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
 from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
-from falsifier.stl import Verdict, parse
+from falsifier.stl import Verdict
 from falsifier.stl.margins import margin_words, signed
 
 # A name and what is said under it: a row of a table, or a line of text.
 Fact = tuple[str, str]
 # Names of the numbers of signals that are not real, by signal.
 Labels = Mapping[str, Mapping[int, str]]
-# Maximum number of signals whose values are told.
-_MOST_VALUES = 40
 
 
 def result_text(result: Result) -> str:
@@ -166,16 +164,11 @@ def margin_facts(verdict: Verdict | None, units: Mapping[str, str], labels: Labe
     """Return the robustness, what decided it and when, with the values then; nothing without a verdict."""
     if verdict is None:
         return []
-    # Of many signals, those that decided come first.
-    first = parse(verdict.predicate).signals if len(verdict.values) > _MOST_VALUES else ()
     values = []
-    for name in [*dict.fromkeys((*first, *verdict.values))][:_MOST_VALUES]:
-        value = verdict.values[name]
+    for name, value in verdict.values.items():
         label = labels[name].get(int(value)) if labels.get(name) else None
         words = in_unit(f"{name} = {readable(value)}", units.get(name, ""))
         values.append(f"{words} ({label})" if label else words)
-    if more := len(verdict.values) - len(values):
-        values.append(f"and {more} more")
     meaning = margin_words(verdict.robustness, verdict.predicate)
     return [
         ("robustness", f"{signed(verdict.robustness)} ({meaning})"),

@@ -130,7 +130,6 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
         (["replay", "gone.json"], "no such file"),
         (["export", "."], ". is a folder of runs; give one of them: run"),
         (["explain", "run/manifest.json"], "not a counterexample file"),
-        (["coverage", "run", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),
         (["report", "run", "--out", "gone/x.html"], "gone/x.html: no such folder gone"),
         (["report", "run", "--csv", "run/x.csv", "--arch-comp", "gone/x.csv"], "no such folder gone"),
         (["coverage", "run", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),

@@ -1,4 +1,3 @@
-import json
 import os
 import signal
 import subprocess
@@ -10,45 +9,15 @@ import pytest
 from matplotlib.figure import Figure
 
 from falsifier.cli.files import checked_picture
-from falsifier.cli.output import as_shown, conclude, say
+from falsifier.cli.output import say
 from falsifier.errors import SpecError
 from falsifier.views.plotting.axes import save_figure
-from falsifier.views.text import fact_lines
 from tests.command import ROOT, listen_to_interrupts
 
 
 def test_results_have_no_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
     say("a\x1b[2Jb\n", nl=False)
     assert capsys.readouterr().out == "a\N{REPLACEMENT CHARACTER}[2Jb\n"
-
-
-def test_a_result_that_cannot_be_printed_keeps_its_code(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def full(*_: object) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(sys.stdout, "write", full)
-    with pytest.raises(SystemExit) as end:
-        conclude("falsified", 1)
-    monkeypatch.undo()
-    assert end.value.code == 1
-    assert "the result cannot be printed: No space left" in capsys.readouterr().err
-
-
-def test_long_facts_are_wrapped_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
-    text = "\n".join(
-        ["AT1: falsified", *fact_lines([("confirmed", "a well-known cause " * 6), ("gear", "4")])]
-    )
-    assert as_shown(text, {}, as_json=False) == text
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    monkeypatch.setenv("COLUMNS", "60")
-    first, *facts, last = as_shown(text, {}, as_json=False).splitlines()
-    assert (first, last) == ("AT1: falsified", "  gear           4")
-    assert facts[0].startswith("  confirmed      a well-known cause")
-    assert len(facts) > 2 and max(map(len, facts)) <= 60
-    assert all(line.startswith(" " * 17 + "a well-known") or line[17] != " " for line in facts)
-    assert json.loads(as_shown(text, {"a": "b " * 90}, as_json=True)) == {"a": "b " * 90}
 
 
 @pytest.mark.parametrize("ending", ["png", "svg", "pdf"])
@@ -85,16 +54,6 @@ output.end_at_interrupts(1)
 print("ready", flush=True)
 {REST}
 """
-CLOSED = """
-import os, sys
-from falsifier.cli import output
-
-output.open_streams()
-assert os.open(sys.argv[1], os.O_WRONLY | os.O_CREAT) > 2
-print("lost")
-print("lost", file=sys.stderr)
-output.settle_streams()
-"""
 
 
 def started(code: str) -> "subprocess.Popen[str]":
@@ -130,15 +89,3 @@ def test_a_signal_that_comes_twice_at_once_counts_once() -> None:
         process.send_signal(signal.SIGTERM)
     out, err = process.communicate(timeout=50)
     assert (process.returncode, out, err) == (0, "summary\n", "")
-
-
-def test_files_do_not_take_the_place_of_closed_streams(tmp_path: Path) -> None:
-    file = tmp_path / "journal"
-    command = 'exec "$0" -c "$1" "$2" <&- >&- 2>&-'
-    done = subprocess.run(
-        ["sh", "-c", command, sys.executable, CLOSED, str(file)],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
-        check=False,
-    )
-    assert done.returncode == 0
-    assert file.read_text() == ""

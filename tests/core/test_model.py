@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from falsifier.core.model import Experiment, FunctionModel, ModelInfo, Variable
+from falsifier.core.function_model import FunctionModel
+from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.errors import MonitorError, SimulationError, SpecError

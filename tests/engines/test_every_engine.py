@@ -8,7 +8,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from falsifier.core.model import FunctionModel, Variable
+from falsifier.core.function_model import FunctionModel
+from falsifier.core.model import Variable
 from falsifier.engines import ENGINES, make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import FunctionModel, Variable
+from falsifier.core.function_model import FunctionModel
+from falsifier.core.model import Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.errors import CandidateError, FalsifierError, SimulationError, SpecError

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from falsifier.core.model import FunctionModel
+from falsifier.core.function_model import FunctionModel
 from falsifier.errors import SimulationError, SpecError, setting
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.evaluation.workers import LastingExecutor, death, local_executor, open_workers, start

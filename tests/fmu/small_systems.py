@@ -1,7 +1,6 @@
 """Systems of the test FMUs: a plant T x' = u - x and a controller y = k (r - measured) without states."""
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -50,8 +49,8 @@ def sampled_loop(late: int, *, steps: int = 10, step: float = STEP) -> NDArray[n
 
 
 def solved(name: str, step: float | None = None) -> Component:
-    return Component(Path(path(name)), step, "model-exchange")
+    return Component(path(name), step, "model-exchange")
 
 
 def component(name: str, step: float) -> Component:
-    return Component(Path(path(name)), step)
+    return Component(path(name), step)

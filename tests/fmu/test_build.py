@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.core.compiler import compiler
+from falsifier.core.compiler import compile_c, compiler
 from falsifier.core.files import bundled
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError
@@ -141,3 +141,21 @@ def test_no_compiler_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)
     with pytest.raises(ModelError, match="pip install ziglang"):
         compiler()
+
+
+@needs_compiler
+@pytest.mark.skipif(this_platform() != "x86_64-linux", reason="the library of the test is for Linux")
+def test_libraries_beside_that_of_an_fmu_are_found_but_none_that_its_process_needs(tmp_path: Path) -> None:
+    place, stub = "binaries/linux64/", tmp_path / "stub.c"
+    stub.write_text("int unused;")
+    (tmp_path / "libhelper.so").write_bytes(read_entry(fixtures.path("Lag_2"), f"{place}Lag.so"))
+    (tmp_path / "libm.so.6").write_text("no library: whoever loads it fails")
+    linked = [str(stub), "-L.", "-Wl,--no-as-needed", "-l:libhelper.so", "-o", "Lag.so"]
+    compile_c(tmp_path, tmp_path, ["-shared", "-fPIC", *linked])
+    files: dict[str, str | bytes] = {
+        place + name: (tmp_path / name).read_bytes() for name in ("Lag.so", "libhelper.so", "libm.so.6")
+    }
+    files["modelDescription.xml"] = read_entry(fixtures.path("Lag_2"), "modelDescription.xml")
+    models = FmuModel(packed(tmp_path / "a.fmu", files)), fixtures.isolated("Lag_2")
+    found, known = (run(model, ("y",), signals={"u": ramp(1.0)})["y"].tolist() for model in models)
+    assert found == known

@@ -126,6 +126,11 @@ def test_what_is_wrong_is_named_where_it_is_stated(
             {"throttle": {"free": {"max_control_points": 3, "min_interval": 100.0}}},
             "min_interval: 100 s is longer than",
         ),
+        (
+            "inputs",
+            {"throttle": {"control_points": 7, "free": {"max_control_points": 3, "min_interval": 1.0}}},
+            r"inputs\.throttle: .*7 control points are more than free allows",
+        ),
         ("model", {"record": ["sped"]}, r"model\.record: .*'speed'"),
         ("model", {"omit": ["sped"]}, r"model\.omit: no output 'sped'"),
     ],
@@ -134,6 +139,12 @@ def test_what_a_spec_says_must_fit_its_model(section: str, changes: dict[str, An
     spec = SPEC | {section: SPEC[section] | changes}
     with pytest.raises(SpecError, match=told):
         join(parse_spec(spec, file="my.toml"), "R", path=FILE)
+
+
+def test_control_points_that_nobody_states_are_no_more_than_free_allows() -> None:
+    spec = SPEC | {"inputs": {"throttle": {"free": {"max_control_points": 3, "min_interval": 1.0}}}}
+    (throttle,) = join(parse_spec(spec, file="my.toml"), "R", path=FILE).space.inputs
+    assert throttle.control_points == 3
 
 
 def test_a_hold_that_is_shorter_than_a_step_is_noted() -> None:

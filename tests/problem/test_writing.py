@@ -107,13 +107,12 @@ def test_sections_in_any_order_are_kept(folder: Path) -> None:
     assert set(read_spec(path).profiles) == {"fast"}
 
 
-def test_in_another_folder_the_fmu_and_context_files_are_found(folder: Path) -> None:
-    path = Path(spec(folder, GOOD + "[context]\nfiles = ['notes.md']\nchecked = ['notes.md']\n"))
+def test_in_another_folder_the_fmu_is_found(folder: Path) -> None:
+    path = Path(spec(folder, GOOD))
     (folder / "deeper").mkdir()
     out = folder / "deeper" / "new.toml"
     out.write_text(with_requirement(subject_of(str(path)), out, "G (rpm <= 1)", description="")[0])
     assert load_problem(f"{out}:R1").name == "R1"
-    assert read_spec(out).context.files == read_spec(out).context.checked == ("../notes.md",)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere all names are text")
@@ -127,28 +126,6 @@ def test_from_another_folder_one_that_is_not_of_utf_8_cannot_be_named(
     subject = subject_of(spec(Path(), GOOD))
     with pytest.raises(SpecError, match=r"AT\.fmu: the name is not valid UTF-8"):
         with_requirement(subject, folder / "new.toml", "G (rpm <= 1)", description="")
-
-
-def test_in_another_folder_files_of_strings_and_of_rights_are_found(tmp_path: Path) -> None:
-    for name in ("deeper", "tables", "logs"):
-        (tmp_path / name).mkdir()
-    (tmp_path / "tables" / "gain.txt").write_text("2.5")
-    spec = tmp_path / "my.toml"
-    spec.write_text(f"""
-        model = {{ fmu = '{fmu_path("Table_2")}', allow = ["read:tables", "write:~", "programs"] }}
-        inputs.u.control_points = 2
-        parameters.fileName = "tables/gain.txt"
-        profiles.P.requirements.R.parameters.fileName.value = "tables/"
-        requirements.R = {{ formula = "G (y <= 1)", allow = ["write:logs"], parameters.fileName = "-" }}""")
-    out = tmp_path / "deeper" / "new.toml"
-    out.write_text(with_requirement(subject_of(str(spec)), out, "G (y <= 2)", description="")[0])
-    new = tomllib.loads(out.read_text())
-    assert new["model"]["allow"] == ["read:../tables/", "write:~", "programs"]
-    assert new["requirements"]["R"]["allow"] == ["write:../logs/"]
-    assert new["requirements"]["R"]["parameters"]["fileName"] == "-"
-    assert new["profiles"]["P"]["requirements"]["R"]["parameters"]["fileName"] == {"value": "../tables/"}
-    ((name, text),) = load_problem(f"{out}:R1").experiment.strings
-    assert (name, Path(text).resolve()) == ("fileName", tmp_path / "tables" / "gain.txt")
 
 
 def test_a_spec_keeps_its_line_ends(folder: Path) -> None:

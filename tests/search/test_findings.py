@@ -60,8 +60,8 @@ def test_the_remedy_depends_on_why_the_space_was_fixed() -> None:
     assert not told(lag_problem(points=100)), "as many control points as make sense leave nothing out"
     assert "engine='surrogate'" in told(free, "cma")
     fixed = load_problem("AT1", parameterization="fixed")
-    assert told(fixed).endswith("To try them: parameterization='free'.")
-    assert told(fixed, "cma").endswith("To try them: engine='surrogate' with parameterization='free'.")
+    assert told(fixed).endswith("To try them: shortest_piece=0.25.")
+    assert told(fixed, "cma").endswith("To try them: engine='surrogate' with shortest_piece=0.25.")
 
 
 def test_a_section_in_the_remedy_is_one_that_toml_reads(tmp_path: Path) -> None:

@@ -28,8 +28,8 @@ from falsifier.search.result import Result
 from falsifier.search.steps import Steps
 from falsifier.stl import parse
 from falsifier.stl.margins import is_on_limit
-from falsifier.testing import FREE, START, lag_problem
-from tests.problems import mostly_broken
+from falsifier.testing import FREE, START, Response, lag, lag_problem
+from tests.problems import mostly_broken, still
 from tests.record.support import run
 from tests.searches import Wrapped
 
@@ -162,6 +162,14 @@ def test_a_search_of_few_whole_numbers_ends_when_all_were_simulated(engine: str)
     result = run(problem, engine=engine, budget=60)
     assert result.reason == "the whole search space was simulated, 3 candidates"
     assert {e.candidate.signals["u"].values for e in result.evaluations} == {(-1.0,), (0.0,), (1.0,)}
+
+
+@pytest.mark.parametrize("response", [lag, still])
+def test_no_more_simulations_are_advised_when_all_were_simulated(response: Response) -> None:
+    problem = whole(lag_problem("G[0,0] (x <= 2)", response=response), "integer")
+    assert "Search longer" in run(problem, engine="uniform", budget=2).findings[0].text
+    for findings in (run(problem, engine="uniform", budget=60).findings, assess(problem, budget=60).findings):
+        assert findings[0].kind == "constant" and "longer" not in findings[0].text
 
 
 def test_candidates_with_other_control_points_are_none_of_the_search_space() -> None:

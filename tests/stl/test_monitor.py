@@ -115,6 +115,14 @@ def test_a_gear_must_be_held_for_two_and_a_half_seconds(held: float, robustness:
         assert verdict.predicate == "abs(gear - 2) <= 0.5"
 
 
+def test_of_many_signals_a_verdict_keeps_those_of_the_formula_and_some_others() -> None:
+    many = Trajectory(np.arange(3.0), {f"y{i}": np.full(3, float(i)) for i in range(100)})
+    values = Monitor(parse("G[0,2] (y77 <= 99)"), 1.0, 3).evaluate(many).values
+    assert [*values.items()][:2] == [("y77", 77.0), ("y0", 0.0)] and len(values) == 40
+    all_of_them = " and ".join(f"y{i} <= 99" for i in range(60))
+    assert len(Monitor(parse(all_of_them), 1.0, 3).evaluate(many).values) == 60
+
+
 def test_a_verdict_names_what_decided_it_and_has_all_values_then() -> None:
     t = np.linspace(0.0, 100.0, 10_001)
     gap = np.where((t > 20.0 + 1e-9) & (t < 60.0 - 1e-9), 7.5, 9.0)

@@ -1,6 +1,6 @@
 import pytest
 
-from falsifier.views.html import Html, el, join, whole_options
+from falsifier.views.html import Html, el, join
 
 
 @pytest.mark.parametrize(
@@ -19,11 +19,6 @@ from falsifier.views.html import Html, el, join, whole_options
         (el("br"), "<br>"),
         (el("td"), "<td></td>"),
         (el("circle", el("title", "t")), "<circle><title>t</title></circle>"),
-        # Lines do not end within the name of an option.
-        (
-            whole_options("try --api-base <b>, or a-b --x"),
-            'try <span class="option">--api-base</span> &lt;b&gt;, or a-b <span class="option">--x</span>',
-        ),
     ],
 )
 def test_values_become_markup(made: str, markup: str) -> None:

@@ -107,6 +107,6 @@ def test_if_nothing_gets_better_rate_and_time_left_are_told(capsys: pytest.Captu
     told = [line for line in capsys.readouterr().err.splitlines() if "simulation" in line]
     assert told[0] == "simulation 1: best robustness +2 at t = 0 s"
     assert told[1:] == [
-        "simulation 101 of 1000: nothing better; 10 per s, about 40 s left at most",
-        "simulation 201 of 1000: nothing better; 10 per s, about 30 s left at most",
+        "101 of 1000 simulations, about 40 s left.",
+        "201 of 1000 simulations, about 30 s left.",
     ]

@@ -14,7 +14,6 @@ from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
 from falsifier.search.result import Result
-from falsifier.stl import Verdict
 from falsifier.testing import lag_problem
 from falsifier.views.report import html_report, markdown_report
 from falsifier.views.text import margin_facts, result_json, result_text, results_text
@@ -118,12 +117,6 @@ def test_what_broke_comes_before_what_decided(premise: Result) -> None:
     assert told_json["predicate"] == "u >= 0.9"
     assert told_json["breach"]["text"] == "; ".join(line.removeprefix("what broke").strip() for line in told)
     assert told_json["breach"]["shortfalls"][0]["part"] == "x <= 0.5"
-
-
-def test_of_many_signals_the_values_of_some_are_told_first_of_those_that_decided() -> None:
-    verdict = Verdict(1.0, 2.0, "y77 <= 9", {f"y{i}": float(i) for i in range(100)})
-    values = dict(margin_facts(verdict, {}, {}))["values then"]
-    assert values.startswith("y77 = 77, y0 = 0, y1 = 1,") and values.endswith("y38 = 38, and 60 more")
 
 
 def test_a_line_of_several_says_if_a_part_was_not_tested(found: Result) -> None:

@@ -1,18 +1,19 @@
 """The text of scripts that simulate a counterexample in other tools."""
 
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from importlib.resources import files
 from math import ceil
 
 from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
 from falsifier.core.model import INTERFACE_TAGS, Model
-from falsifier.core.words import readable
+from falsifier.core.words import listed, readable
 from falsifier.counterexamples.export import tables
 from falsifier.counterexamples.export.tables import text_of
 from falsifier.counterexamples.store import FILE_NAME
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
+from falsifier.fmu.description.archive import this_platform
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
 from falsifier.stl.margins import signed
@@ -27,6 +28,8 @@ Simulates a counterexample with FMPy only; writes outputs.csv and prints the row
 
     pip install fmpy
     python replay.py [MODEL.fmu]
+
+{platforms}
 
 {requirement}: {formula}
 {recorded}
@@ -50,6 +53,7 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
     about = _REPLAY_ABOUT.format(
         requirement=one_line(problem.name),
         formula=one_line(str(problem.requirement.formula)),
+        platforms=f"{_platforms(model)}.",
         recorded=_recorded_lines(verdict),
     )
     return _template("replay.template").format(
@@ -86,6 +90,19 @@ def unplayable(model: Model) -> str:
         if why:
             return f"simulate_fmu of FMPy cannot take {why}: use falsifier replay {FILE_NAME}"
     return ""
+
+
+def _platforms(model: FmuModel) -> str:
+    """Say where FMPy runs an FMU: unlike falsifier, it does not use Wine."""
+    return f"FMPy runs this FMU on {listed(model.info.platforms)} only, for which it has binaries"
+
+
+def replay_notes(model: Model) -> Iterator[str]:
+    """Yield what keeps replay.py from simulating a model here, or anywhere."""
+    if refusal := unplayable(model):
+        yield refusal
+    if isinstance(model, FmuModel) and this_platform() not in model.info.platforms:
+        yield f"{_platforms(model)}, and this is {this_platform()}"
 
 
 def _recorded_lines(verdict: Verdict) -> str:

@@ -14,7 +14,7 @@ _PENDING = 5
 _OF_ALL = (Where.UNSETTLED, Where.NOT_CONVERGED, Where.TIMEOUT)
 _BEFORE = "at {reached}, before the stop time {stop}"
 _EVENT = f"the event iteration {{returned}} {_BEFORE}"
-_FIRST_STEP = "the first step, of {step} s, {returned}; {remedy}"
+_FIRST_STEP = "the first step, of {step} s, {returned}{remedy}"
 _TEXTS: Mapping[int, str] = {
     Where.SETTING: f"setting the inputs {{returned}} {_BEFORE}",
     Where.STEPPING: f"the step {{returned}} {_BEFORE}",
@@ -72,7 +72,7 @@ def failure(
         reached=f"t = {readable(reply.time)} s",
         stop=f"{readable(plan.stop_time)} s",
         step=f"{step:.6g}",
-        remedy=_other_step(member, step),
+        remedy=_other_step(member, step, log),
         out_of_time=_out_of_time(plan),
         string=_string(network, plan, reply),
         outputs=", ".join(_titles(network, words)),
@@ -121,16 +121,20 @@ def last_lines(log: tuple[str, ...]) -> str:
     return f"; its last message: {lines[0]}" if lines else ""
 
 
-def _other_step(member: Member, step: float) -> str:
-    """Say which step to state for an FMU that refuses the one that it was asked for."""
+def _other_step(member: Member, step: float, log: tuple[str, ...]) -> str:
+    """Say which step to state for an FMU that refuses the one that it was asked for.
+
+    Empty if it says in its messages why it failed, and that is no step; nor does it declare another one.
+    """
     option = written("--output-interval, or as step_size in a spec", "step_size")
     option = f"components.{member.name}.step" if member.step else option
     internal = member.description.info.internal_step
     if internal is None or abs(step / internal - max(1, round(step / internal))) < 1e-9:
-        return f"an FMU of one step only needs it as {option}"
+        is_explained = any(line.strip() for line in log) and not any("step" in line.lower() for line in log)
+        return "" if is_explained else f"; an FMU of one step only needs it as {option}"
     return (
-        f"the FMU's internal step is {internal:g} s: state a multiple of it as {option}, and round the times "
-        "in formulas to multiples of that"
+        f"; the FMU's internal step is {internal:g} s: state a multiple of it as {option}, and round the "
+        "times in formulas to multiples of that"
     )
 
 

@@ -1,11 +1,14 @@
 """A worker's process with its files: the memory that it shares, its output, and the configuration of Wine."""
 
+import filecmp
 import os
 import signal
+import subprocess
 import sys
 import sysconfig
 from collections.abc import Mapping
 from functools import lru_cache
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +17,7 @@ from numpy.typing import NDArray
 from falsifier.core import posix, posix_files
 from falsifier.core.literals import printable
 from falsifier.errors import ModelError
+from falsifier.fmu.description.archive import OLD_PLATFORMS, this_platform
 from falsifier.fmu.description.libraries import find_wine, windows_path
 from falsifier.fmu.process.rights import Rights, encoded, hidden_places
 from falsifier.fmu.process.workplace import Workplace, worker_environment
@@ -30,6 +34,8 @@ _DROPPED = "(further output was dropped)"
 _OVERRIDES = "wineboot.exe,services.exe,explorer.exe,winemenubuilder.exe,mscoree,mshtml="
 # What PythonFMU puts into FMUs that call the Python of the process that loads them; there are FMUs of FMUs.
 _WRITTEN_IN_PYTHON = ("*/resources/slavemodule.txt", "*/resources/*/resources/slavemodule.txt")
+# The folders in which the system looks first for the libraries that a library needs.
+_LIBRARY_PATH = "LD_LIBRARY_PATH"
 # Exceptions of Windows by the signals that the same mistakes have elsewhere.
 _SIGNALS = {
     0xC0000005: signal.SIGSEGV,  # access violation
@@ -133,8 +139,10 @@ class Started:
         if through_wine:
             _make_prefix(scratch / "prefix")
             environment = _wine_environment(environment, scratch)
-        elif any(any(folder.glob(pattern)) for pattern in _WRITTEN_IN_PYTHON):
-            environment = _python_environment(environment)
+        else:
+            if any(any(folder.glob(pattern)) for pattern in _WRITTEN_IN_PYTHON):
+                environment = _python_environment(environment)
+            environment = _with_libraries(environment, path, folder, scratch / "libraries")
         # It gets no descriptors for these through Wine.
         replies, shared = (scratch / "replies", scratch / "memory") if through_wine else (None, None)
         self.connect, self.place = ("" if each is None else windows_path(each) for each in (replies, shared))
@@ -176,6 +184,40 @@ def _python_environment(environment: Mapping[str, str]) -> dict[str, str]:
     found = {"LD_PRELOAD": str(library if library.is_file() else library.name)}
     folders = (str(Path(sys.executable).parent), environment.get("PATH", os.defpath))
     return {**found, **environment, "PATH": os.pathsep.join(folders)}
+
+
+def _with_libraries(environment: dict[str, str], program: Path, folder: Path, links: Path) -> dict[str, str]:
+    """Return an environment in which FMUs find the libraries beside their own, as in importers elsewhere.
+
+    The process that watches the FMU, which nothing confines, has the same environment. So what the program
+    itself needs is never taken from an FMU; nor is a library of which two FMUs have different ones.
+
+    Args:
+        environment: that of the program.
+        program: what will be started.
+        folder: to which the FMUs were unpacked, each to a folder of its own.
+        links: a new folder for links to the libraries, made if there are any.
+    """
+    here, known = this_platform(), environment.get(_LIBRARY_PATH)
+    names = [here, *(old for old, new in OLD_PLATFORMS.items() if new == here)]
+    places = [place for name in names for place in folder.glob(f"*/binaries/{name}")]
+    found = [[f for f in place.glob("*.so*") if f.is_file() and not f.is_symlink()] for place in places]
+    if sys.platform != "linux" or all(len(files) < 2 for files in found):
+        return environment
+    told = {**environment, "LD_TRACE_LOADED_OBJECTS": "1"}
+    traced = subprocess.run([program], env=told, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    own = {Path(line.split()[0]).name for line in traced.stdout.splitlines() if line.strip()}
+    # Where the system's loader tells nothing, such as musl's, it is not known what the program needs.
+    if traced.returncode or not own or not {":", ";"}.isdisjoint(str(links)):
+        return environment
+    by_name: dict[str, list[Path]] = {}
+    for file in chain.from_iterable(found):
+        by_name.setdefault(file.name, []).append(file)
+    links.mkdir()
+    for name, (first, *others) in by_name.items():
+        if name not in own and all(filecmp.cmp(first, other, shallow=False) for other in others):
+            (links / name).symlink_to(first)
+    return {**environment, _LIBRARY_PATH: f"{known}:{links}" if known else str(links)}
 
 
 def _make_prefix(prefix: Path) -> None:

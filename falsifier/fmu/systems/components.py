@@ -3,10 +3,11 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, floor
+from os import PathLike
 from pathlib import Path
 from typing import get_args
 
-from falsifier.core.arguments import finite, instance, one_of, positive
+from falsifier.core.arguments import finite, instance, one_of, path_of, positive
 from falsifier.core.model import GRID_ROUNDING, Interface, ModelInfo, Variable, common_part, exact
 from falsifier.errors import SpecError
 from falsifier.fmu.description.archive import file_hash
@@ -18,7 +19,7 @@ from falsifier.fmu.process.network import SYSTEM, Extrapolation, Link, Member, P
 _SHOWN_LINKS = 40
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, init=False)
 class Component:
     """One FMU of a system.
 
@@ -30,21 +31,25 @@ class Component:
 
     Raises:
         ModelError: if the file cannot be read.
-        SpecError: if the step is not positive.
+        SpecError: if the path, the step or the interface is not as above, or the step not positive.
     """
 
     fmu: Path
-    step: float | None = None
-    interface: Interface | None = None
-    sha256: str = field(default="", init=False)
+    step: float | None
+    interface: Interface | None
+    sha256: str = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "fmu", Path(self.fmu).absolute())
-        if self.step is not None:
-            positive("step", self.step)
-        if self.interface is not None:
-            one_of("interface", self.interface, get_args(Interface))
-        object.__setattr__(self, "sha256", file_hash(self.fmu))
+    def __init__(
+        self, fmu: str | PathLike[str], step: float | None = None, interface: Interface | None = None
+    ) -> None:
+        path = path_of("fmu", fmu, "the path of an FMU").absolute()
+        if step is not None:
+            positive("step", step)
+        if interface is not None:
+            one_of("interface", interface, get_args(Interface))
+        found = {"fmu": path, "step": step, "interface": interface, "sha256": file_hash(path)}
+        for name, value in found.items():
+            object.__setattr__(self, name, value)
 
 
 @dataclass(frozen=True, slots=True)

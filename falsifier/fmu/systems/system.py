@@ -70,7 +70,7 @@ class System(Isolated):
         if "" in self.components:
             raise SpecError("components: the name of a component is empty; give it one")
         components = {
-            name: each if isinstance(each, Component) else Component(Path(each))
+            name: each if isinstance(each, Component) else Component(each)
             for name, each in self.components.items()
         }
         connections = {

@@ -57,7 +57,9 @@ class Disguise:
             info=ModelInfo(
                 name="not named",
                 description="Names are neutral and numbers have no units",
-                variables=tuple(Variable(names[name], self._kind(name)) for name in others),
+                variables=tuple(
+                    Variable(names[name], self._kind(name), real.variable(name).causality) for name in others
+                ),
             ),
             requirement=Requirement("R", replaced(real.requirement.formula, self._signals)),
             space=SearchSpace(

@@ -131,12 +131,15 @@ def _continuous(
 
 
 def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> str:
-    there = []
+    there, untold = [], view.untold
     for name, value in trajectory.at(diagnosis.critical_time).items():
+        if name in untold:
+            continue
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
         unit = f" {unit}" if (unit := view.variable(name).unit) else ""
         there.append(f"{name} = {view.labelled(name, value, plain(value, decimals))}{unit}")
-    return f"all signals at t = {plain(diagnosis.critical_time, _clock(view))} s: {', '.join(there)}"
+    time = plain(diagnosis.critical_time, _clock(view))
+    return f"{'all ' * (not untold)}signals at t = {time} s: {', '.join(there)}"
 
 
 def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[str]:

@@ -340,5 +340,5 @@ def _text(inputs: Sequence[str], *lines: str) -> str:
 
 def _counting(view: View) -> dict[str, dict[int, str]]:
     """Recorded signals that may count up, with the names of their values; none where no types are told."""
-    recorded = map(view.variable, view.experiment.outputs)
+    recorded = map(view.variable, view.recorded)
     return {v.name: number_names(v.kind, v.items) for v in recorded if v.kind in ("integer", "enumeration")}

@@ -32,7 +32,7 @@ class SampleProgress:
         columns = view.inside(trajectory).columns
         stages: set[Stage] = set()
         ranges = {}
-        for name in view.experiment.outputs:
+        for name in (name for name in view.recorded if name in columns):
             column = columns[name]
             if view.is_discrete(name, column):
                 kept = column[np.flatnonzero(np.diff(column, prepend=np.nan))].tolist()

@@ -156,7 +156,9 @@ def _outputs(view: View, start: Mapping[str, tuple[float, float]]) -> Iterator[s
     if not view.recorded:
         yield "Output signals: none; the requirement refers to inputs only."
         return
-    yield "Recorded signals:"
+    untold = len(view.untold)
+    others = f", without {counted(untold, 'other')}, which are too many to be told" if untold else ""
+    yield f"Recorded signals{others}:"
     for name in view.recorded:
         known = view.variable(name)
         values = known.items_text or (known.kind if known.kind in ("integer", "boolean") else "")

@@ -21,6 +21,10 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl.formula import Temporal
 
+# What the lines on signals that nobody asked for may have in bytes, and what each has besides its name and
+# its description: fewer than 200 of them are told, so that a prompt fits whatever the FMU has.
+_MOST_OF_OTHERS, _BYTES_OF_LINE = 40_000, 200
+
 
 @dataclass(frozen=True, slots=True)
 class View:
@@ -78,8 +82,24 @@ class View:
 
     @property
     def recorded(self) -> tuple[str, ...]:
-        """Signals that are told over time, those of the formula first."""
-        return tuple(dict.fromkeys((*self.formula_outputs, *self.experiment.outputs)))
+        """Signals that are told over time, those of the formula first.
+
+        What a spec records although it is no output, and what the files say something of, is always told; of
+        all other outputs as many as fit.
+        """
+        outputs = self.experiment.outputs
+        wanted = (n for n in outputs if self.variable(n).causality != "output" or self.context.of(n))
+        asked = {*self.formula_outputs, *wanted}
+        others = [n for n in outputs if n not in asked]
+        texts = (f"{n}{self.variable(n).description}".encode() for n in others)
+        sizes = np.cumsum([_BYTES_OF_LINE + len(text) for text in texts])
+        asked.update(others[: int(np.searchsorted(sizes, _MOST_OF_OTHERS, side="right"))])
+        return tuple(n for n in dict.fromkeys((*self.formula_outputs, *outputs)) if n in asked)
+
+    @property
+    def untold(self) -> frozenset[str]:
+        """Signals that are recorded and not told, because they are too many."""
+        return frozenset(self.experiment.outputs).difference(self.recorded)
 
 
 Part = Literal[

@@ -3,6 +3,7 @@
 The only package that imports matplotlib. Functions draw on given axes or a new figure, and need no display.
 """
 
+import logging
 from typing import TYPE_CHECKING
 
 from falsifier.views.plotting.analyses import plot_coverage, plot_robustness_map
@@ -18,6 +19,9 @@ from falsifier.views.plotting.simulation import (
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Figure
+
+# Where no home is writable, matplotlib keeps its fonts in a temporary folder, and advises to set a variable.
+logging.getLogger("matplotlib").addFilter(lambda record: record.funcName != "_get_config_or_cache_dir")
 
 __all__ = [
     "plot",

@@ -13,7 +13,7 @@ from falsifier.core.words import counted
 from falsifier.problem.problem import held_text
 from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
-from falsifier.views.html import Html, el, join, picture, table, whole_options
+from falsifier.views.html import Html, el, join, picture, table
 from falsifier.views.plotting import plot_history, plot_panels, plot_rates, svg
 from falsifier.views.report import wording
 from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather, spent_on
@@ -175,17 +175,12 @@ def _found(shown: Shown) -> list[str]:
         facts_html(parameters) if parameters else "",
         join(el("h3", "Explanation"), el("p", shown.explanation)) if shown.explanation else "",
         facts_html([("confirmed", shown.confirmed)]) if shown.confirmed else "",
-        *(
-            el("p", f"{what}: ", el("code", whole_options(how)), class_="note")
-            for what, how in wording.advice(shown)
-        ),
+        *(el("p", f"{what}: ", el("code", how), class_="note") for what, how in wording.advice(shown)),
     ]
 
 
 def _lines(title: str, lines: Sequence[str]) -> str:
-    return (
-        join(el("h3", title), el("ul", *(el("li", whole_options(line)) for line in lines))) if lines else ""
-    )
+    return join(el("h3", title), el("ul", *(el("li", line) for line in lines))) if lines else ""
 
 
 def _details(section: Section, most: int) -> Html:
@@ -238,7 +233,7 @@ def _shown_details(shown: Shown) -> Html:
     """What engineers of searches ask about a simulation, and how it is repeated."""
     rationale = shown.candidate.rationale
     facts = [*wording.margin_beside(shown), *([("rationale", rationale)] if rationale else [])]
-    facts += [(name, el("code", whole_options(command))) for name, command in wording.commands(shown)]
+    facts += [(name, el("code", command)) for name, command in wording.commands(shown)]
     return facts_html(facts)
 
 

@@ -14,7 +14,12 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import bundled
 from falsifier.core.signals import Interpolation, Signal
-from falsifier.counterexamples.export.scripts import openmodelica_script, replay_script, unplayable
+from falsifier.counterexamples.export.scripts import (
+    openmodelica_script,
+    replay_notes,
+    replay_script,
+    unplayable,
+)
 from falsifier.counterexamples.store import FILE_NAME
 from falsifier.evaluation.evaluate import evaluate, evaluate_any
 from falsifier.fmu import FmuModel
@@ -189,6 +194,19 @@ def test_inputs_that_fmpy_cannot_take_end_the_script(
         problem = Problem.from_fmu(fmu, "G (y <= 1)", inputs={"time": (0.0, 1.0)})
         script = replay_script(problem, evaluate(problem, somewhere(problem)), ["time"])
         assert script is not None and f"\nsys.exit({told!r})\n" in script
+
+
+def test_the_replay_script_says_on_which_platforms_fmpy_runs_the_fmu() -> None:
+    problem = Problem.from_fmu(fmu_path("Lag_2"), "G (y <= 1)", inputs={"u": (0.0, 1.0)})
+    evaluation = evaluate(problem, somewhere(problem))
+    assert not list(replay_notes(problem.model))
+    for name, platform in (("Lag_2", "x86_64-linux"), ("win64/Lag_2", "x86_64-windows")):
+        model = FmuModel(fmu_path(name))
+        script = replay_script(replace(problem, model=model), evaluation, ["u"])
+        assert (
+            script is not None and f"FMPy runs this FMU on {platform} only" in script.partition("import")[0]
+        )
+    assert "x86_64-windows only" in "".join(replay_notes(model))
 
 
 def test_odd_names_and_two_names_of_one_input_reproduce_in_fmpy(tmp_path: Path) -> None:

@@ -81,7 +81,7 @@ def test_the_default_step_divides_the_steps_of_the_components(
 
 def test_the_default_step_is_no_longer_than_that_of_an_fmu_without_a_step_of_its_own() -> None:
     fmus = Path(__file__).resolve().parents[3] / "fmus"
-    parts = {"car": Component(fmus / "ATCar.fmu"), "shift": Component(fmus / "ATShift.fmu", 0.04)}
+    parts = {"car": Component(str(fmus / "ATCar.fmu")), "shift": Component(fmus / "ATShift.fmu", 0.04)}
     assert System(parts).info.step_size == pytest.approx(0.01)
 
 

@@ -10,8 +10,11 @@ import pytest
 
 from falsifier.context.values import Compared, Context, Excerpt
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import Variable
 from falsifier.core.space import ParameterRange, SearchSpace
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
+from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm import DEFAULT_VARIANT
 from falsifier.llm.prompts import VARIANTS, View, variant_named
 from falsifier.llm.prompts.disguise import Disguise
@@ -129,6 +132,28 @@ def test_start_values_are_told_if_they_do_not_depend_on_what_is_chosen() -> None
     depends = standing(problem, start={"x": (-0.5, 0.5)})
     assert "at t = 0: depends on what you choose" in depends and "-0.5 to 0.5" not in depends
     assert "; at t = 0" not in standing(problem, "MP4", start={"x": (0.25, 0.25)})
+
+
+@pytest.mark.parametrize("description", ["", "what it means " * 20])
+def test_a_question_fits_however_many_outputs_there_are(description: str) -> None:
+    problem = lag_problem()
+    evaluation = evaluate(problem, problem.space.decode([1, 1, 1, 1]))
+    assert evaluation.trajectory is not None
+    others = [Variable(f"y{i}", causality="output", description=description) for i in range(2000)]
+    inner = Variable("inner", description="a state that the spec records")
+    outputs = (*(v.name for v in others), "x", inner.name)
+    x = evaluation.trajectory["x"]
+    columns = {**evaluation.trajectory.columns, **dict.fromkeys(outputs[:2000], x * 0), inner.name: x + 3}
+    info = replace(problem.info, variables=(*problem.info.variables, *others, inner))
+    view = replace(View.of(problem), info=info, experiment=replace(problem.experiment, outputs=outputs))
+    evaluation = replace(evaluation, trajectory=Trajectory(evaluation.trajectory.times, columns))
+    first, second = told(view, "MP5", [evaluation])
+    assert first.index("- x [m]") < first.index("- y0") < first.index("- inner")
+    shown = first.count("\n- y")
+    assert 50 < shown <= 200 and f"without {2000 - shown} others" in first
+    assert "Sample 1: " in second and "inner = " in second and "y1999" not in first + second
+    hidden = Disguise.of(view)
+    assert ", without 18" in told(hidden.view, "MP5", [hidden.hidden(evaluation)])[0]
 
 
 class TestReply:

@@ -1,3 +1,6 @@
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -7,7 +10,7 @@ from matplotlib.figure import Figure
 
 from falsifier import Evaluation, falsify
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import FunctionModel
+from falsifier.core.function_model import FunctionModel
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
@@ -199,3 +202,11 @@ def test_of_several_limits_the_one_with_the_small_margin_is_enlarged() -> None:
     assert (
         not plot_evaluation(on_limit, evaluate(on_limit, on_limit.space.decode([0.0] * 4))).axes[0].child_axes
     )
+
+
+def test_nothing_is_said_of_a_home_that_cannot_be_written() -> None:
+    code = "import falsifier.views.plotting, matplotlib.figure"
+    hidden = {"MPLCONFIGDIR", "XDG_CONFIG_HOME", "XDG_CACHE_HOME"}
+    own = {name: value for name, value in os.environ.items() if name not in hidden} | {"HOME": os.devnull}
+    done = subprocess.run([sys.executable, "-c", code], env=own, capture_output=True, text=True, check=True)
+    assert done.stderr == ""

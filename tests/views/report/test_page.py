@@ -97,7 +97,6 @@ def test_the_order_is_verdict_picture_inputs_confirmation_and_the_rest_is_folded
     assert "open" not in more.attrib
     for folded in ("uniform, seed 0", "rationale", "falsifier replay", "falsifier run python:tests"):
         assert folded in content(more)
-    assert "--engine" in [content(e) for e in every(more, "span", "option")], "no line ends within it"
     versions = content(every(page, "details")[-1])
     assert "numpy" in versions and "Python" in versions
     assert len(every(more, "img")) == 2 + 1 + 2, "a history for each method, shares, two more counterexamples"
