@@ -140,6 +140,8 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
         ),
         (Step(status=503, message="context size pool overloaded"), "/v1: context size pool overloaded"),
         (Step(status=429, message="exceeded your current quota: PerDay. Retry in 7s."), "no quota left"),
+        (Step(status=400, raw='{"error": "not loaded"}'), "/v1: not loaded"),
+        (Step(status=400, raw='{"detail": [{"msg": "it\'s missing"}]}'), "/v1: it's missing"),
         (Step(raw='{"error": ["odd"]}'), '/v1: the server reports: ["odd"]'),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
