@@ -79,22 +79,16 @@ def _show_in_notebook(line: "_Line") -> None:
 
 
 class _Line:
-    """One line on a run that is replaced as it goes on, below the news, or with the latest of them.
-
-    Attributes:
-        title: the requirements and the engine.
-        total: maximum number of simulations; None without a limit.
-        done: number of simulations so far.
-        handle: where it is shown in a notebook.
-    """
+    """One line on a run that is replaced as it goes on, below the news, or with the latest of them."""
 
     def __init__(self, show: Callable[["_Line"], None], keep: Callable[[str], None] | None) -> None:
         self._show, self._keep, self._news = show, keep, News()
         self._begin("", Budget())
 
     def _begin(self, title: str, budget: Budget) -> None:
+        # The requirements and the engine; the limit on simulations, None without one; those so far.
         self.title, self.total, self.done = title, budget.simulations, 0
-        self.handle: Any = None
+        self.handle: Any = None  # where it is shown in a notebook
         self._seconds, self._most, self._note = 0.0, budget.seconds or inf, ""
 
     @property
