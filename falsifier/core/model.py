@@ -9,7 +9,7 @@ from typing import Literal, Protocol, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.arguments import one_of, positive
+from falsifier.core.arguments import instance, one_of, positive
 from falsifier.core.fixed import fixed
 from falsifier.core.literals import digits
 from falsifier.core.signals import Signal
@@ -392,6 +392,10 @@ class FunctionModel:
         Mapping[str, NDArray[np.float64]],
     ]
     info: ModelInfo
+
+    def __post_init__(self) -> None:
+        instance("function", self.function, Callable, "a function")
+        instance("info", self.info, ModelInfo, "a ModelInfo")
 
     def simulate(
         self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment
