@@ -263,7 +263,7 @@ def test_what_no_simulation_tested_is_a_warning_and_with_strict_an_error(
     with pytest.raises(UntestedError, match="LAG is not violated, but not all of it was tested"):
         _tell_doubts(request.node, checked, strict=True)
     half = check(lag_problem("G[0,10] (x <= 2)", response=broken), engine="uniform", budget=7)
-    with pytest.raises(UntestedError, match=r"not all of it was tested\n2 simulations failed: .*x' is nan"):
+    with pytest.raises(UntestedError, match=r"not all of it was tested\n2 simulations failed, .*x' is nan"):
         _tell_doubts(request.node, half, strict=True)
 
 

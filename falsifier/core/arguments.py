@@ -40,7 +40,7 @@ def positive(name: str, given: object) -> float:
     raise SpecError(f"{name}: expected a positive number, got {given!r}")
 
 
-def instance(name: str, given: object, kind: type | tuple[type, ...], expected: str) -> None:
+def instance(name: str, given: object, kind: Any, expected: str) -> None:
     """Check the type of a value that a user gave."""
     if not isinstance(given, kind):
         raise SpecError(f"{name}: expected {expected}, got {reprlib.repr(given)} ({type(given).__name__})")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.arguments import instance
 from falsifier.core.model import Experiment, ModelInfo, check_finite
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
@@ -29,6 +30,10 @@ class FunctionModel:
         Mapping[str, NDArray[np.float64]],
     ]
     info: ModelInfo
+
+    def __post_init__(self) -> None:
+        instance("function", self.function, Callable, "a function")
+        instance("info", self.info, ModelInfo, "a ModelInfo")
 
     def simulate(
         self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment

@@ -1,8 +1,10 @@
 """Failures of requests to a language model, classified by what can be done about them."""
 
+import ast
 import json
 import re
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
 from typing import Any
@@ -30,6 +32,10 @@ _UNREADABLE = (
 # litellm's class, llama.cpp, LM Studio, OpenAI; vLLM in three versions; Groq. A pool is what others use up.
 _CONTEXT = "context[ _]?(window|size|length)(?! pool)|maximum model length|too long to fit|reduce the length"
 _LONGEST_DETAIL = 600
+_LONGEST_BODY = 100_000
+# How OpenAI's client begins an error whose JSON it does not know; it follows as Python would write it.
+_CLIENT = re.compile(r"^Error code: \d+ - ")
+_OF_WORDS = ("message", "error", "detail", "msg")
 _LETTERS = re.compile(r"[^\W\d_]{2}")
 # The title of a page that a proxy answers with says what the page says.
 _TITLE = re.compile(r"<title>([^<]+)</title>", re.IGNORECASE)
@@ -170,18 +176,26 @@ def _detail(text: str, status: int | None) -> str:
     More follows in most messages.
     """
     said = own_words(text)
-    try:
-        stated = json.loads(said)["error"]
-        told = stated if isinstance(stated, str) else stated["message"]
-    except (ValueError, TypeError, KeyError, RecursionError):
-        told = said
+    body = _CLIENT.sub("", said)
+    read = json.loads if body == said else ast.literal_eval
+    told = ""
+    with suppress(ValueError, SyntaxError, TypeError, RecursionError, MemoryError):
+        told = _words(read(body[:_LONGEST_BODY]))
     if title := _TITLE.search(said):
         told = title[1]
-    told = told if isinstance(told, str) and told.strip() else text
-    detail = without_full_stop(shortened(" ".join(told.split()), _LONGEST_DETAIL))
+    detail = without_full_stop(shortened(" ".join((told.strip() or body).split()), _LONGEST_DETAIL))
     if status is not None and not _LETTERS.search(detail):
         return f"the server answers with the HTTP status {status} and without a reason"
     return detail
+
+
+def _words(stated: object) -> str:
+    """The words in the JSON of an error, as servers nest them: empty if there are none."""
+    if isinstance(stated, dict):
+        return next(filter(None, (_words(stated.get(key)) for key in _OF_WORDS)), "")
+    if isinstance(stated, list):
+        return _words(stated[0]) if stated else ""
+    return stated if isinstance(stated, str) else ""
 
 
 def _status(error: Exception) -> int | None:

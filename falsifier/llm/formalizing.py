@@ -45,9 +45,9 @@ is clear, and two or three, the most probable first, if engineers could understa
 reading has
 - formula: the formula.
 - meaning: one sentence that says what it requires, and how it differs from the other readings.
-- units: for each signal in the formula the unit in which you wrote its numbers, "" if it has none.
-- satisfied: a small example that meets the sentence as you understand it: each signal of the formula with
-  times (s) and values, linear between them.
+- units: a list of {"signal": name, "unit": the unit in which you wrote its numbers, "" if it has none}.
+- satisfied: a small example that meets the sentence as you understand it: a list of {"name": signal,
+  "times": [s], "values": [...]}, linear between them, for each signal of the formula.
 - violated: the same for an example that does not meet it.
 The formula is checked on both examples, so choose values clearly on one side of every threshold.
 If no formula over these signals can say it (a rate without a signal that is the rate, "after each step" of

@@ -68,7 +68,7 @@ class Failure:
         which = f"simulation {self.simulation + 1}"
         if self.count == 1:
             return f"{which} failed: {self.reason}"
-        return f"{self.count} simulations failed: {self.reason} (for example {which})"
+        return f"{self.count} simulations failed, for example {which}: {self.reason}"
 
 
 def cause_of(reason: str) -> str:
@@ -80,7 +80,7 @@ def failures(reasons: Iterable[tuple[int, str]]) -> tuple[Failure, ...]:
     """Group failed simulations, given by index and reason, by their cause; the most frequent first.
 
     >>> [f.text for f in failures([(3, "index 0 is outside of 1..5"), (7, "index 9 is outside of 1..5")])]
-    ['2 simulations failed: index 0 is outside of 1..5 (for example simulation 4)']
+    ['2 simulations failed, for example simulation 4: index 0 is outside of 1..5']
     """
     found: dict[str, Failure] = {}
     for index, reason in reasons:

@@ -57,19 +57,12 @@ class Verdict:
 
 
 class Extremes(NamedTuple):
-    """Smallest and largest robustness of a part of a formula over all samples at which it counts.
-
-    Attributes:
-        low: smallest robustness.
-        lowest: its time in s.
-        high: largest robustness.
-        highest: its time in s.
-    """
+    """Smallest and largest robustness of a part of a formula over all samples at which it counts."""
 
     low: float
-    lowest: float
+    lowest: float  # its time in s
     high: float
-    highest: float
+    highest: float  # its time in s
 
 
 @dataclass(frozen=True, slots=True)

@@ -244,8 +244,7 @@ class _Parser:
                 f"{end_text}{end_unit or start_unit}]",
             )
         window = stl.Window(_seconds(start_text, start_unit), _seconds(end_text, end_unit))
-        is_rounded = start_unit != end_unit and math.isclose(window.start, window.end, rel_tol=_ROUNDED)
-        if window.start > window.end and is_rounded:
+        if start_unit != end_unit and math.isclose(window.start, window.end, rel_tol=_ROUNDED):
             # [1.3333333s,0.0222222min] is one moment; the bound in the smaller unit is the more exact one.
             moment = (
                 window.start if lexer.UNITS[start_unit or "s"] < lexer.UNITS[end_unit or "s"] else window.end

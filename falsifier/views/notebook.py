@@ -11,16 +11,22 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
+from falsifier.analyses.assess import Assurance
+from falsifier.analyses.coverage import Coverage
+from falsifier.analyses.margin import Margin
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import ModelInfo
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import candidate_facts, counted, readable
 from falsifier.counterexamples.explain import Explanation
+from falsifier.counterexamples.robustness_map import RobustnessMap
+from falsifier.counterexamples.shrink import Shrunk
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 from falsifier.search.result import Result
 from falsifier.stl import Verdict, in_words
+from falsifier.views.analyses_text import coverage_text
 from falsifier.views.exchanges import exchanges_html
 from falsifier.views.html import el, join, picture, table
 from falsifier.views.model_text import info_text
@@ -115,7 +121,10 @@ _FORMATTERS: Mapping[type, Callable[[Any], str]] = {
     Evaluation: evaluation_html,
     Candidate: lambda candidate: table((), candidate_facts(candidate)),
     Confirmation: lambda c: join(el("p", f"{c.outcome}: {c.reason}"), evaluation_html(c.evaluation)),
-    Explanation: lambda explanation: el("p", explanation.text),
+    **dict.fromkeys((Explanation, Margin, RobustnessMap), lambda found: el("p", found.text)),
+    Assurance: lambda found: el("pre", found.text),
+    Coverage: lambda found: el("pre", coverage_text(found, "Coverage")),
+    Shrunk: lambda shrunk: evaluation_html(shrunk.evaluation),
     ModelInfo: lambda info: el("pre", info_text(info)),
     Trajectory: trajectory_html,
     Result: result_html,

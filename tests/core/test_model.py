@@ -48,6 +48,8 @@ def test_a_function_is_a_model() -> None:
     assert got["level"][-1] == pytest.approx(4.0)
     assert got["full"].tolist() == [0.0] * 3 + [1.0] * 8
     assert got.units == {"level": "m"}
+    with pytest.raises(SpecError, match="function: expected a function, got ModelInfo"):
+        FunctionModel(INFO, tank)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("given", "level"), [({}, 0.0), ({"inflow": 3.0, "area": 1.0}, 3.0)])

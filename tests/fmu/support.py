@@ -39,15 +39,20 @@ def commit(model: FmuModel, misdeed: int, *, time_limit: float = patience.HANG) 
 
 def script(body: str, **environment: str) -> str:
     """Return what a process prints that simulates."""
+    return python(SCRIPT + body, str(fixtures.path("Misdeeds_2")), **environment).stdout
+
+
+def python(code: str, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a process of Python that finds what this one does."""
     return subprocess.run(
-        [sys.executable, "-c", SCRIPT + body, str(fixtures.path("Misdeeds_2"))],
+        [sys.executable, "-c", code, *arguments],
         stdout=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **environment},
         preexec_fn=listen_to_interrupts,
         timeout=patience.HANG,
         check=False,
-    ).stdout
+    )
 
 
 def assert_nothing_is_left(folder: Path) -> None:

@@ -17,7 +17,7 @@ from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
 from tests import patience
 from tests.fmu.fixtures import isolated, path, run, worker
-from tests.fmu.support import assert_nothing_is_left
+from tests.fmu.support import assert_nothing_is_left, python
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the test FMUs are built for Linux")
 
@@ -141,20 +141,9 @@ def script(body: str, folder: Path, **environment: str) -> subprocess.CompletedP
     """Run a process that simulates, with a folder for temporary files, and one in which the FMU counts."""
     counting = folder / "counting"
     counting.mkdir(exist_ok=True)
-    return subprocess.run(
-        [sys.executable, "-c", SCRIPT + body, str(path("Hostile_2")), str(counting)],
-        stdout=subprocess.PIPE,
-        text=True,
-        check=False,
-        env={
-            **os.environ,
-            "PYTHONPATH": os.pathsep.join(sys.path),
-            "TMPDIR": str(folder),
-            "HOSTILE_COUNT": str(counting / "count"),
-            "FALSIFIER_FMU_VARIABLES": "HOSTILE_FMU, HOSTILE_COUNT",
-            **environment,
-        },
-    )
+    environment["FALSIFIER_FMU_VARIABLES"] = "HOSTILE_FMU, HOSTILE_COUNT"
+    environment |= {"TMPDIR": str(folder), "HOSTILE_COUNT": str(counting / "count")}
+    return python(SCRIPT + body, str(path("Hostile_2")), str(counting), **environment)
 
 
 def test_shared_memory_that_is_resized_while_an_fmu_is_loaded_does_no_harm(tmp_path: Path) -> None:

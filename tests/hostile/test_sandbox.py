@@ -4,7 +4,6 @@ Everything that they try is of fixed names in a folder of the test, and each tes
 change nothing outside that folder whatever the worker's own sandbox lets through (``cage``).
 """
 
-import os
 import signal
 import subprocess
 import sys
@@ -15,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from tests.fmu.fixtures import path
+from tests.fmu.support import python
 from tests.hostile import cage
 from tests.hostile.test_fmus import children, have_ended
 
@@ -80,21 +80,12 @@ class Place:
     ) -> str:
         """Let an FMU do something to files of fixed names in a folder; return what came of it."""
         script = SCRIPT.replace("{before}", before) + more
-        numbers = (str(misdeed), str(variant))
-        return subprocess.run(
-            [sys.executable, "-c", script, str(path("Hostile_2")), *numbers, *rights],
-            stdout=subprocess.PIPE,
-            text=True,
-            check=True,
-            env={
-                **os.environ,
-                "PYTHONPATH": os.pathsep.join(sys.path),
-                "PYTHONDONTWRITEBYTECODE": "1",
-                "HOME": str(self.home),
-                "TMPDIR": str(self.root),
-                "HOSTILE_LICENSE": str(at or self.home),
-            },
-        ).stdout
+        folders = {"HOME": self.home, "TMPDIR": self.root, "HOSTILE_LICENSE": at or self.home}
+        environment = {name: str(folder) for name, folder in folders.items()}
+        environment["PYTHONDONTWRITEBYTECODE"] = "1"
+        done = python(script, str(path("Hostile_2")), str(misdeed), str(variant), *rights, **environment)
+        done.check_returncode()
+        return done.stdout
 
 
 @pytest.fixture

@@ -1,5 +1,3 @@
-import socket
-
 import pytest
 
 from falsifier.core.secrets import redact
@@ -78,18 +76,12 @@ def test_a_context_that_is_too_short_is_known_by_the_words_of_each_server(said: 
         LiteLLMChat("openai/m", api_base=server.url).send(REQUEST)
 
 
-def free_port() -> int:
-    """Port of this machine on which nothing listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 @pytest.mark.parametrize("model", ["openai/m", "ollama_chat/m", "hosted_vllm/m", "lm_studio/m"])
 def test_where_nothing_listens_on_this_machine_little_patience_helps(
     model: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    address = f"http://127.0.0.1:{free_port()}/v1"
+    with serving(Step()) as server:  # whose port nobody listens to when it has gone
+        address = server.url
     naps: list[float] = []
     monkeypatch.setattr("falsifier.llm.client.sleep", naps.append)
     chat = LiteLLMChat(model, api_base=address)
@@ -140,6 +132,8 @@ def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
         ),
         (Step(status=503, message="context size pool overloaded"), "/v1: context size pool overloaded"),
         (Step(status=429, message="exceeded your current quota: PerDay. Retry in 7s."), "no quota left"),
+        (Step(status=400, raw='{"error": "not loaded"}'), "/v1: not loaded"),
+        (Step(status=400, raw='{"detail": [{"msg": "it\'s missing"}]}'), "/v1: it's missing"),
         (Step(raw='{"error": ["odd"]}'), '/v1: the server reports: ["odd"]'),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

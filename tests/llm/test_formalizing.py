@@ -33,6 +33,8 @@ def test_the_question_has_signals_language_templates_and_the_sentence() -> None:
         "and 82 more internal variables",
         "The requirement:\nThe tank never runs dry.",
         "G[a,b] (f)",
+        '{"signal": name, "unit": the unit',  # servers that ignore the schema tell no form
+        '{"name": signal,\n  "times": [s], "values": [...]}',
         *(f"- {name}: {template.summary}" for name, template in TEMPLATES.items()),
     ):
         assert part in user.content, part

@@ -31,7 +31,7 @@ def test_failures_that_differ_only_in_numbers_have_one_cause() -> None:
     ]
     found = failures(reasons)
     assert [(f.count, f.simulation) for f in found] == [(2, 2), (1, 4), (1, 6)]
-    assert found[0].text.startswith("2 simulations failed: m: index 0 is outside of 1..5 at t = 1.25s (for")
+    assert found[0].text.startswith("2 simulations failed, for example simulation 3: m: index 0 is out")
     assert found[1].text == "simulation 5 failed: m: car2 diverged at 0x7f01"
 
 

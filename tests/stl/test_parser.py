@@ -80,6 +80,7 @@ def test_arithmetic(text: str, value: float) -> None:
         ("[0.29min,17.4s]", stl.Window(17.4, 17.4)),
         ("[1.3333333s,0.0222222min]", stl.Window(1.3333333, 1.3333333)),
         ("[0.0222223min,1.3333333s]", stl.Window(1.3333333, 1.3333333)),
+        ("[0.2s,0.00333333333333334min]", stl.Window(0.2, 0.2)),
         ("[0,250us]", stl.Window(0, 0.00025)),
         ("[1e1, 2E1]", stl.Window(10, 20)),
     ],

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from IPython.core.formatters import DisplayFormatter
 
-from falsifier import Evaluation, ParameterRange, evaluate, explain, falsify
+from falsifier import Evaluation, ParameterRange, assess, evaluate, explain, falsify, robustness_map, shrink
 from falsifier.core.candidate import Candidate
 from falsifier.testing import lag_problem
 from falsifier.views.notebook import register
@@ -58,8 +58,12 @@ def test_a_violating_result_shows_its_robustness_and_a_picture(notebook: Noteboo
     assert result.counterexample is not None
     problem, found = result.problem, result.counterexample.evaluation
     shown = (result.counterexample, found.candidate, problem.info, explain(problem, found))
+    found_out = (assess(problem, budget=2), robustness_map(problem, found, budget=9), shrink(problem, found))
     words = ("<p>confirmed: a fresh sim", "u constant 1", "<pre>lag  FMI", "<p>HARD requires: ")
-    assert all(each in notebook.html(value) for value, each in zip(shown, words, strict=True))
+    words_out = ("<pre>Violations: ", "random changes", "u constant 1")
+    assert all(
+        each in notebook.html(value) for value, each in zip(shown + found_out, words + words_out, strict=True)
+    )
     assert f"{found.robustness:+.6g} (violated" in html
     (picture,) = pictures(html)
     assert {OUTPUT, INPUT, CRITICAL} <= colours(picture), "what decided is drawn"

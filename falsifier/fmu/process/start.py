@@ -114,14 +114,6 @@ class Output:
 class Started:
     """A worker's process with what belongs to it, for FMUs that were unpacked to a folder.
 
-    Attributes:
-        program: the process.
-        output: what it prints.
-        memory: what it shares with this process.
-        connect: what it is told first: where its replies go.
-        place: what it is told of where the memory is.
-        exception: the exception of Windows that has ended it, if it has told one.
-
     Raises:
         ModelError: if there is no program for this machine.
     """
@@ -133,8 +125,8 @@ class Started:
             command = (str(find_wine()), windows_path(workplace.program(windows=True)))
         self._scratch = scratch = workplace.scratch()
         self._code: int | None = None
-        self.exception: int | None = None
-        self.output = Output()
+        self.exception: int | None = None  # of Windows, which has ended it, if it has told one
+        self.output = Output()  # what it prints
         environment = worker_environment(os.environ, scratch)
         if through_wine:
             _make_prefix(scratch / "prefix")
@@ -143,10 +135,10 @@ class Started:
             if any(any(folder.glob(pattern)) for pattern in _WRITTEN_IN_PYTHON):
                 environment = _python_environment(environment)
             environment = _with_libraries(environment, path, folder, scratch / "libraries")
-        # It gets no descriptors for these through Wine.
+        # What it is told: where its replies go and where the memory is. Through Wine it gets no descriptors.
         replies, shared = (scratch / "replies", scratch / "memory") if through_wine else (None, None)
         self.connect, self.place = ("" if each is None else windows_path(each) for each in (replies, shared))
-        self.memory = Memory(shared)
+        self.memory = Memory(shared)  # what it shares with this process
         try:
             memory = int(posix.machine_memory() * _MEMORY_SHARE)
             told = encoded(rights, (scratch, folder), _hidden(), memory=memory, command=command)

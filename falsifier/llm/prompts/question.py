@@ -249,7 +249,7 @@ class Questions:
     def _best_first(self) -> list[_Sample]:
         """Samples with a verdict by their robustness; where it is flat, by how far their signals got."""
         if self._is_flat():
-            return sorted(self._judged, key=lambda s: (-self._reached.rank(s.progress), s.number))
+            return sorted(self._judged, key=lambda s: self._reached.rank(s.progress), reverse=True)
         return sorted(self._judged, key=lambda s: (s.robustness or 0.0, s.number))
 
     def _left(self, budget: int | None) -> str:

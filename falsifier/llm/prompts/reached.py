@@ -1,8 +1,10 @@
 """How far the recorded signals of a sample got, which says more than a robustness that is flat."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
+from math import fsum
 
 import numpy as np
 
@@ -48,32 +50,33 @@ class Reached:
 
     def __init__(self, view: View) -> None:
         self._view = view
-        self._stages: set[Stage] = set()
+        self._stages: Counter[Stage] = Counter()  # in how many samples
         self._ranges: dict[str, tuple[float, float]] = {}
 
     def news(self, progress: SampleProgress) -> tuple[str, ...]:
         """Add a sample; return what no earlier one did, in words; of the first one nothing."""
         is_begun = self._stages or self._ranges
         found = [*self._new_stages(progress), *self._further(progress)] if is_begun else []
-        self._stages |= progress.stages
+        self._stages.update(progress.stages)
         for name, (low, high) in progress.ranges.items():
             least, most = self._ranges.get(name, (low, high))
             self._ranges[name] = (min(low, least), max(high, most))
         return (*found[:_MOST_NEW], *(["..."] if len(found) > _MOST_NEW else []))
 
-    def rank(self, progress: SampleProgress) -> float:
-        """How far a sample got among all so far: its stages, and the share of all ranges that it covered."""
+    def rank(self, progress: SampleProgress) -> tuple[float, float]:
+        """How far a sample got: its stages, of which rare ones count more; then the share of all ranges."""
         shares = [
             (high - low) / (most - least)
             for name, (low, high) in progress.ranges.items()
             for least, most in [self._ranges.get(name, (low, high))]
             if most > least
         ]
-        return len(progress.stages) + (sum(shares) / len(shares) if shares else 0.0)
+        rarity = fsum(1.0 / self._stages[stage] for stage in progress.stages)
+        return rarity, sum(shares) / len(shares) if shares else 0.0
 
     def _new_stages(self, progress: SampleProgress) -> Iterator[str]:
         for name, before, value in sorted(
-            progress.stages - self._stages, key=lambda s: (s[0], s[1] is not None, s[1] or 0.0, s[2])
+            progress.stages - self._stages.keys(), key=lambda s: (s[0], s[1] is not None, s[1] or 0.0, s[2])
         ):
             text = self._value(name, value)
             yield f"{name} {text}" if before is None else f"{name} {self._value(name, before)} -> {text}"

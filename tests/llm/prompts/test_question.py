@@ -12,6 +12,7 @@ from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import VARIANTS, Questions, View
+from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.usage import count_tokens
 from falsifier.problem.problem import Problem
 from falsifier.testing import FREE, START, lag_problem
@@ -105,6 +106,16 @@ def test_what_decided_and_everything_there() -> None:
         "brake: constant 0",
     ):
         assert part in changing, part
+
+
+def test_what_few_samples_reached_counts_more_than_much_that_many_did() -> None:
+    reached = Reached(View.of(PROBLEM))
+    usual, rare = (
+        SampleProgress(frozenset(("u", None, n) for n in stages)) for stages in ((0, 1, 2), (1, 3))
+    )
+    for progress in (usual, usual, usual, rare):
+        reached.news(progress)
+    assert reached.rank(rare) > reached.rank(usual)
 
 
 def test_on_a_plateau_samples_rank_by_what_their_signals_did() -> None:
