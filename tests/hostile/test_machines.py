@@ -75,6 +75,12 @@ def test_too_little_memory_is_said_at_once(number: int, most: int, says: str, tm
     assert says in said and said.count("\n") == 1
 
 
+@pytest.mark.parametrize("most", [14, 19])
+def test_too_few_open_files_are_told_with_the_cure(most: int, tmp_path: Path) -> None:
+    code, said = run(tmp_path, before=limited(resource.RLIMIT_NOFILE, most))
+    assert code == 3 and said.endswith("Too many open files; raise the limit on open files (ulimit -n)\n")
+
+
 @pytest.mark.parametrize(("shell", "tmpdir"), [("2>&-", "."), ("<&- >&- 2>&-", "none")])
 def test_simulations_need_no_streams_and_take_any_tmpdir(shell: str, tmpdir: str, tmp_path: Path) -> None:
     assert run(tmp_path, shell=shell, TMPDIR=tmpdir)[0] == 0
@@ -182,7 +188,7 @@ def test_a_search_that_can_no_longer_be_recorded_has_found_what_it_found(
     monkeypatch.setattr(Journal, "__call__", until_full)
     result = falsify(easy(), "corners", directory=tmp_path / "run")
     assert result.falsified
-    assert "No space left" in result.unrecorded
+    assert "No space left on device; free some space" in result.unrecorded
     with pytest.raises(SystemExit) as end:
         command._finish([result], as_json=False)
     assert end.value.code == 1

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from falsifier.core import posix, posix_files
 from falsifier.core.literals import printable
-from falsifier.errors import ModelError
+from falsifier.errors import ModelError, remedy
 from falsifier.fmu.description.libraries import find_wine, windows_path
 from falsifier.fmu.process.rights import Rights, encoded, hidden_places
 from falsifier.fmu.process.workplace import Workplace, worker_environment
@@ -108,14 +108,6 @@ class Output:
 class Started:
     """A worker's process with what belongs to it, for FMUs that were unpacked to a folder.
 
-    Attributes:
-        program: the process.
-        output: what it prints.
-        memory: what it shares with this process.
-        connect: what it is told first: where its replies go.
-        place: what it is told of where the memory is.
-        exception: the exception of Windows that has ended it, if it has told one.
-
     Raises:
         ModelError: if there is no program for this machine.
     """
@@ -127,15 +119,16 @@ class Started:
             command = (str(find_wine()), windows_path(workplace.program(windows=True)))
         self._scratch = scratch = workplace.scratch()
         self._code: int | None = None
-        self.exception: int | None = None
-        self.output = Output()
+        self.exception: int | None = None  # that of Windows that has ended it, if it has told one
+        self.output = Output()  # what it prints
         environment = worker_environment(os.environ, scratch)
         if through_wine:
             _make_prefix(scratch / "prefix")
             environment = _wine_environment(environment, scratch)
         elif any(any(folder.glob(pattern)) for pattern in _WRITTEN_IN_PYTHON):
             environment = _python_environment(environment)
-        # It gets no descriptors for these through Wine.
+        # It gets no descriptors for these through Wine. It is told first where its replies go, and then where
+        # the memory is that it shares with this process.
         replies, shared = (scratch / "replies", scratch / "memory") if through_wine else (None, None)
         self.connect, self.place = ("" if each is None else windows_path(each) for each in (replies, shared))
         self.memory = Memory(shared)
@@ -148,7 +141,7 @@ class Started:
         except BaseException as error:
             self._close()
             if isinstance(error, OSError):
-                raise ModelError(f"{path} cannot be started: {error}") from error
+                raise ModelError(f"{path} cannot be started: {error}{remedy(error)}") from error
             raise
 
     def end(self) -> int:
