@@ -93,14 +93,6 @@ class Worker(Started):
 
     Simulations after the first start by ``reuse``; without one, it finds out how, but tries no untrusted way.
 
-    Attributes:
-        plan: the plan for which it is prepared; None: it has not loaded the FMU.
-        logging: whether it asks the FMU for messages.
-        awaits_test: whether it is finding out how simulations can start.
-        simulations: number of simulations that it has completed.
-        is_cut: whether the FMU has disturbed or cut the connection.
-        started: when it was started, by time.perf_counter().
-
     Raises:
         ModelError: if it cannot be started.
     """
@@ -120,11 +112,11 @@ class Worker(Started):
         ways = integers(known, sum(1 << REUSES.index(way) for way in untrusted))
         self._load = ways + order.load(folder, logging=logging)
         super().__init__(workplace, folder, order.rights, through_wine=order.through_wine)
-        self.plan: Plan | None = None
-        self.logging = logging
-        self.awaits_test = False
-        self.simulations = 0
-        self.is_cut = False
+        self.plan: Plan | None = None  # for which it is prepared; None: it has not loaded the FMU
+        self.logging = logging  # whether it asks the FMU for messages
+        self.awaits_test = False  # whether it is finding out how simulations can start
+        self.simulations = 0  # number of those that it has completed
+        self.is_cut = False  # whether the FMU has disturbed or cut the connection
         self.started = time.perf_counter()
         self._is_quick = False
 

@@ -7,13 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.analyses.coverage import (
-    Coverage,
-    OutputCoverage,
-    PairCoverage,
-    RangeCoverage,
-    edges_of,
-)
+from falsifier.analyses.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage, edges_of
 from falsifier.core.space import number_names
 from falsifier.core.words import counted, with_unit
 from falsifier.counterexamples.robustness_map import RobustnessMap
