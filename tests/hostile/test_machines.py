@@ -67,18 +67,13 @@ def run(
         (resource.RLIMIT_DATA, 200 << 20, "ulimit -d 307200"),
         (resource.RLIMIT_DATA, 40 << 20, "ulimit -d 307200"),
         (resource.RLIMIT_AS, 400 << 20, "ulimit -v 512000"),
+        (resource.RLIMIT_NOFILE, 14, "Too many open files; raise the limit on open files (ulimit -n)"),
     ],
 )
-def test_too_little_memory_is_said_at_once(number: int, most: int, says: str, tmp_path: Path) -> None:
+def test_too_low_limits_are_said_at_once(number: int, most: int, says: str, tmp_path: Path) -> None:
     code, said = run(tmp_path, before=limited(number, most))
     assert code == 3
     assert says in said and said.count("\n") == 1
-
-
-@pytest.mark.parametrize("most", [14, 19])
-def test_too_few_open_files_are_told_with_the_cure(most: int, tmp_path: Path) -> None:
-    code, said = run(tmp_path, before=limited(resource.RLIMIT_NOFILE, most))
-    assert code == 3 and said.endswith("Too many open files; raise the limit on open files (ulimit -n)\n")
 
 
 @pytest.mark.parametrize(("shell", "tmpdir"), [("2>&-", "."), ("<&- >&- 2>&-", "none")])
