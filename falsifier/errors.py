@@ -9,6 +9,7 @@ Who is told to state something writes options on the command line, and arguments
 """
 
 import difflib
+import errno
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -40,6 +41,17 @@ _VALIDATORS = (
     ("Input should be greater", "expected a number {}"),
     ("Input should be less", "expected a number {}"),
 )
+
+# What a machine has run out of, and what to do.
+_EXHAUSTED = {
+    errno.ENOSPC: "free some space, or choose a location on another disk",
+    errno.EDQUOT: "delete files of yours, or choose a location on another disk",
+    errno.EFBIG: "raise the limit on the size of files (ulimit -f)",
+    errno.ENOMEM: "free memory, or raise the limit (ulimit -v)",
+    errno.EMFILE: "raise the limit on open files (ulimit -n)",
+    errno.ENFILE: "the machine has too many open files: end other programs",
+    errno.EAGAIN: "end other processes, or raise the limit on them (ulimit -u)",
+}
 
 FailureStatus = Literal["failed", "crashed", "timeout"]
 Reader = Literal["Python", "command line"]
@@ -197,8 +209,13 @@ def written(option: str, argument: str) -> str:
 
 
 def refusal(error: OSError) -> str:
-    """Say which file the operating system refused, and why."""
-    return f"{error.filename}: {error.strerror}" if error.filename else str(error)
+    """Say which file the operating system refused, why, and what to do about a limit of the machine."""
+    return (f"{error.filename}: {error.strerror}" if error.filename else str(error)) + remedy(error)
+
+
+def remedy(error: OSError) -> str:
+    """Return what to do, after a semicolon, if the machine has run out of something; else an empty text."""
+    return f"; {_EXHAUSTED[error.errno]}" if error.errno in _EXHAUSTED else ""
 
 
 def setting(name: str, value: str = "") -> str:

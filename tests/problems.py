@@ -32,20 +32,19 @@ def deadly(times: Array, inputs: dict[str, Array], parameters: dict[str, float])
     os._exit(9)
 
 
-def broken(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
-    """Give NaN whenever the input ends in the upper half of its range."""
+def broken(
+    times: Array, inputs: Columns, parameters: dict[str, float], above: float = 0.0
+) -> Mapping[str, Array]:
+    """Give NaN whenever the input ends in the upper half of its range, or above another number."""
     x = lag(times, inputs, parameters)["x"].copy()
-    if inputs["u"][-1] > 0:
+    if inputs["u"][-1] > above:
         x[5] = np.nan
     return {"x": x}
 
 
 def mostly_broken(times: Array, inputs: Columns, parameters: dict[str, float]) -> Mapping[str, Array]:
     """Give NaN unless the input ends in the lowest fifth of its range."""
-    x = lag(times, inputs, parameters)["x"].copy()
-    if inputs["u"][-1] > -0.6:
-        x[5] = np.nan
-    return {"x": x}
+    return broken(times, inputs, parameters, above=-0.6)
 
 
 def straight(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:

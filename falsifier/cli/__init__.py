@@ -14,7 +14,7 @@ import click
 from falsifier import __version__
 from falsifier.cli import output
 from falsifier.core.posix import check_memory_limits
-from falsifier.errors import FalsifierError, did_you_mean, reader, speak_to
+from falsifier.errors import FalsifierError, did_you_mean, reader, remedy, speak_to
 from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:
@@ -24,16 +24,6 @@ if TYPE_CHECKING:
 _PIPE_CLOSED = 141
 # Set by the shell when it asks for completions; falsifier completes by what click brings.
 _COMPLETES = "_FALSIFIER_COMPLETE"
-# What a machine has run out of, and what to do.
-_EXHAUSTED = {
-    errno.ENOSPC: "free some space, or choose a location on another disk",
-    errno.EDQUOT: "delete files of yours, or choose a location on another disk",
-    errno.EFBIG: "raise the limit on the size of files (ulimit -f)",
-    errno.ENOMEM: "free memory, or raise the limit (ulimit -v)",
-    errno.EMFILE: "raise the limit on open files (ulimit -n)",
-    errno.ENFILE: "the machine has too many open files: end other programs",
-    errno.EAGAIN: "end other processes, or raise the limit on them (ulimit -u)",
-}
 
 # name: (module, summary in --help). A group has a table of its own in place of a module.
 _Table = dict[str, "tuple[str | _Table, str]"]
@@ -187,8 +177,8 @@ def _carried_out(arguments: list[str]) -> int:
 def _report_refusal(error: OSError) -> int:
     """Print what the operating system refused; return the exit code."""
     where = "" if error.filename is None else f"{error.filename}: "
-    if error.errno in _EXHAUSTED:
-        warn(f"falsifier: {where}{error.strerror}; {_EXHAUSTED[error.errno]}")
+    if cure := remedy(error):
+        warn(f"falsifier: {where}{error.strerror}{cure}")
     elif not where:
         gone = "; if the current folder was deleted, change to another" if error.errno == errno.ENOENT else ""
         warn(f"falsifier: {error}{gone}")

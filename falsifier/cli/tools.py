@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING
 import click
 
 from falsifier.campaigns.archcomp import PROTOCOL_SIMULATIONS, Revalidated, read_rows, validate as check_rows
-from falsifier.campaigns.directory import CampaignRecord, is_campaign, read_campaign, run_directory
+from falsifier.campaigns.directory import (
+    CampaignRecord,
+    campaign_lock,
+    is_campaign,
+    is_worked_on,
+    read_campaign,
+    run_directory,
+)
 from falsifier.cli.command import command
 from falsifier.cli.files import check_out, in_existing_folder
 from falsifier.cli.inspect import one_fmu
@@ -21,8 +28,8 @@ from falsifier.errors import JournalError, SpecError
 from falsifier.fmu.build import compile_sources
 from falsifier.problem.spec import Spec
 from falsifier.record.files import set_aside
-from falsifier.record.journal import holds_run, repair as repair_run, simulated
-from falsifier.record.manifest import Manifest
+from falsifier.record.journal import repair as repair_run, simulated
+from falsifier.record.manifest import MANIFEST, Manifest
 from falsifier.record.records import RECORDS
 from falsifier.stl.margins import signed
 
@@ -50,14 +57,18 @@ def repair(*, directory: Path) -> None:
 
 def _repair_campaign(directory: Path) -> list[str]:
     findings: list[str] = []
-    for name in read_campaign(directory).request.named():
-        place = run_directory(directory, name)
-        if not place.is_dir():
-            continue
-        try:
-            findings += _repair_run(place) if holds_run(place) or any(place.iterdir()) else []
-        except JournalError as error:
-            findings.append(f"{error}; kept as {set_aside(place).name}, the campaign repeats it")
+    with campaign_lock(directory):
+        for name in read_campaign(directory).request.named():
+            place = run_directory(directory, name)
+            if not place.is_dir() or not any(place.iterdir()):
+                continue
+            try:
+                findings += _repair_run(place)
+            except JournalError as error:
+                if is_worked_on(place):  # by a process that continues this run alone
+                    raise
+                why = f"{place / MANIFEST}: {error.__cause__}" if error.__cause__ else error
+                findings.append(f"{why}; kept as {set_aside(place).name}, the campaign repeats it")
     return findings
 
 

@@ -191,9 +191,8 @@ class WatchedProgram:
 def _spawn(command: Sequence[str], environment: Mapping[str, str], places: Mapping[int, int]) -> int:
     """Start a program with these open files by the descriptors that it is to have; return its process id."""
     # Copies above all places, so that none is overwritten before it is copied.
-    copies = {
-        place: fcntl.fcntl(given, fcntl.F_DUPFD_CLOEXEC, 16) for place, given in places.items() if given >= 0
-    }
+    above = max(places) + 1
+    copies = {to: fcntl.fcntl(one, fcntl.F_DUPFD_CLOEXEC, above) for to, one in places.items() if one >= 0}
     try:
         actions = [(os.POSIX_SPAWN_DUP2, copy, place) for place, copy in copies.items()]
         session = {"setsid": True} if sys.platform == "linux" else {"setpgroup": 0}

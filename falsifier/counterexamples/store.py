@@ -17,6 +17,7 @@ from falsifier import __version__
 from falsifier.core.arguments import instance, path_of
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, file_name, seal, write_whole
+from falsifier.core.literals import shell_word
 from falsifier.core.strict import Strict
 from falsifier.errors import (
     CandidateError,
@@ -167,6 +168,8 @@ def load_counterexample(path: Path | str) -> StoredCounterexample:
         key, why = first_fault(error)
         if error.errors()[0]["type"] in ("json_invalid", "missing") or not key:
             key, why = "", "expected the counterexample.json of a run, or a run directory"
+            if file.name.startswith("counterexample") and holds_run(file.parent):
+                why = f"damaged; to write it again: falsifier tools repair {shell_word(file.parent)}"
         raise SpecError(f"not a counterexample file: {why}", file=str(file), key=key) from None
     try:
         if stored.sum:

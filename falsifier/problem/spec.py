@@ -130,6 +130,9 @@ def read_spec(path: Path) -> Spec:
             data = tomllib.loads(text)
         except (ValueError, RecursionError) as error:  # also integers of too many digits, and deep nesting
             said = re.sub(r"',?\)", "]", str(error).replace("('", "[").replace("', '", "."))  # of keys
+            if not isinstance(error, tomllib.TOMLDecodeError):
+                deep = isinstance(error, RecursionError)
+                said = "lists or tables are nested too deep" if deep else "a whole number has too many digits"
             at = re.search(r"\(at line (\d+), column (\d+)\)$", said)
             line = text.split("\n")[int(at[1]) - 1] if at else ""
             there = f"{said}: {line[int(at[2]) - 1 :]}\n{line}" if at else said

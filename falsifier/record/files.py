@@ -16,7 +16,7 @@ from filelock import FileLock, Timeout
 from pydantic import BaseModel, ValidationError
 
 from falsifier.core.files import check_seal, checksum, seal, write_whole
-from falsifier.core.literals import one_line
+from falsifier.core.literals import one_line, shell_word
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import JournalError, first_fault, written
 
@@ -52,9 +52,11 @@ def read_sealed(path: Path, kind: type[Content], *, what: str) -> Content:
     except ValidationError as error:
         raise JournalError(": ".join((str(path), *first_fault(error)))) from None
     except (ValueError, OSError) as error:
-        raise JournalError(
-            f"{path} is damaged: {one_line(str(error))}; this {what} cannot be continued: start a new one"
-        ) from None
+        campaign = path.parent.parent.parent
+        remedy = f"this {what} cannot be continued: start a new one"
+        if what == "run" and (campaign / CAMPAIGN).exists():
+            remedy = f"to let the campaign repeat this run: falsifier tools repair {shell_word(campaign)}"
+        raise JournalError(f"{path} is damaged: {one_line(str(error))}; {remedy}") from error
 
 
 @contextmanager

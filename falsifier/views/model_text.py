@@ -70,7 +70,8 @@ def _cells(v: Variable) -> tuple[str, ...]:
     low, high = _number(v.low), _number(v.high)
     if v.causality == "input" and v.kind == "real":
         low, high = low or "unbounded", high or "unbounded"
-    description = " ".join([*v.description.split(), *([f"({v.items_text})"] if v.items_text else [])])
+    said = (v.items_text, "" if v.nominal is None else f"nominally {readable(v.nominal)}")
+    description = " ".join([*v.description.split(), *(f"({text})" for text in said if text)])
     return (v.name, v.kind, unit, low, high, _number(v.start), description)
 
 

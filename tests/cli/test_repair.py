@@ -6,7 +6,8 @@ from click.testing import CliRunner
 
 from falsifier.campaigns.analysis import load as load_runs
 from falsifier.cli import cli
-from falsifier.errors import JournalError
+from falsifier.counterexamples.store import load_counterexample
+from falsifier.errors import JournalError, SpecError
 from falsifier.record.journal import read_journal, simulated
 from tests.hostile.test_damage import Numeric, Standing
 
@@ -26,6 +27,11 @@ def test_a_damaged_line_is_told_with_its_cure_and_the_run_goes_on_from_there(tmp
     assert len(read_journal(tmp_path)) == 3
     assert Numeric().resume(tmp_path).falsified
     assert len(load_runs(tmp_path)[0].robustness) > 3
+    (tmp_path / "counterexample.json").write_bytes(b"")
+    with pytest.raises(SpecError, match=r"damaged; to write it again: falsifier tools repair"):
+        load_counterexample(tmp_path)
+    done = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)])
+    assert done.output.endswith("falsifier replay writes it again\nrepaired\n")
     again = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)]).output
     assert f"nothing is damaged; {simulated(tmp_path)} simulations recorded" in again
 

@@ -14,12 +14,13 @@ from click.testing import CliRunner
 
 from falsifier.campaigns import resume_campaign, run_campaign
 from falsifier.campaigns.analysis import load as load_runs
+from falsifier.campaigns.directory import campaign_lock
 from falsifier.cli import cli
 from falsifier.counterexamples.store import FILE_NAME, load_counterexample, save, to_store
 from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.scripted import ScriptedChat
-from falsifier.record.journal import repair
+from falsifier.record.journal import repair, run_lock
 from falsifier.record.run import falsify, resume
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
@@ -175,8 +176,12 @@ def test_a_damaged_run_costs_itself_and_not_its_campaign(
         shutil.copytree(tmp_path / "whole", tmp_path / "c")
         path = tmp_path / "c" / "runs" / runs[0].name / name
         path.write_bytes(flip(path.read_bytes()[:-3], random) + path.read_bytes()[-3:])
-        with pytest.raises(JournalError):
+        with pytest.raises(JournalError, match=r"falsifier tools repair \S+/c\b"):
             load_runs(tmp_path / "c")
+        for lock in (campaign_lock(tmp_path / "c"), run_lock(path.parent)):
+            with lock:  # what another process writes to stays where it is
+                busy = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path / "c")])
+            assert isinstance(busy.exception, JournalError) and path.exists()
         done = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path / "c")])
         assert done.exit_code == 0, done.output
         resume_campaign(tmp_path / "c")

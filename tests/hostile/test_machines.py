@@ -67,9 +67,10 @@ def run(
         (resource.RLIMIT_DATA, 200 << 20, "ulimit -d 307200"),
         (resource.RLIMIT_DATA, 40 << 20, "ulimit -d 307200"),
         (resource.RLIMIT_AS, 400 << 20, "ulimit -v 512000"),
+        (resource.RLIMIT_NOFILE, 14, "Too many open files; raise the limit on open files (ulimit -n)"),
     ],
 )
-def test_too_little_memory_is_said_at_once(number: int, most: int, says: str, tmp_path: Path) -> None:
+def test_too_low_limits_are_said_at_once(number: int, most: int, says: str, tmp_path: Path) -> None:
     code, said = run(tmp_path, before=limited(number, most))
     assert code == 3
     assert says in said and said.count("\n") == 1
@@ -184,7 +185,7 @@ def test_a_search_that_can_no_longer_be_recorded_has_found_what_it_found(
     monkeypatch.setattr(Journal, "__call__", until_full)
     result = falsify(easy(), "corners", directory=tmp_path / "run")
     assert result.falsified
-    assert "No space left" in result.unrecorded
+    assert "No space left on device; free some space" in result.unrecorded
     with pytest.raises(SystemExit) as end:
         command._finish([result], as_json=False)
     assert end.value.code == 1

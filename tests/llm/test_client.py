@@ -53,6 +53,7 @@ class Wire:
     options: dict[str, Any] = field(default_factory=dict)
 
 
+GPT_OSS = {"model": "openai/gpt-oss-20b", "reasoning_effort": "low", "response_format": STRICT}
 WIRES = [
     Wire(
         "openai/gpt-5-mini",
@@ -61,15 +62,10 @@ WIRES = [
         absent=("temperature", "max_retries"),
         options={"temperature": 0.5},
     ),
-    Wire(
-        "hosted_vllm/openai/gpt-oss-20b",
-        {"model": "openai/gpt-oss-20b", "reasoning_effort": "low", "response_format": STRICT},
-        header=None,
-        absent=("max_retries",),
-    ),
+    Wire("hosted_vllm/openai/gpt-oss-20b", GPT_OSS, header=None, absent=("max_retries",)),
     Wire(
         "huggingface/openai/gpt-oss-20b",
-        {"model": "openai/gpt-oss-20b", "reasoning_effort": "low", "response_format": STRICT},
+        GPT_OSS,
         header=("authorization", "Bearer hf_secret_token"),
         absent=("max_retries",),
     ),
@@ -137,18 +133,16 @@ def test_what_is_sent(wire: Wire) -> None:
 
 def chat_for(wire: Wire, server: Server) -> LiteLLMChat:
     base = server.url if wire.base else server.root
-    return LiteLLMChat(
-        wire.model, effort="low", api_base=base, options=wire.options, mode=first_mode(wire.model)
-    )
+    mode = first_mode(wire.model)
+    return LiteLLMChat(wire.model, effort="low", api_base=base, options=wire.options, mode=mode)
 
 
 @pytest.mark.usefixtures("keys")
 def test_effective_parameters_name_what_was_dropped() -> None:
+    warm = {"temperature": 0.5}
     with serving(Step("a"), Step("b")) as server:
-        known = LiteLLMChat(
-            "openai/gpt-5-mini", effort="low", api_base=server.url, options={"temperature": 0.5}
-        )
-        other = LiteLLMChat("openai/other", api_base=server.url, options={"temperature": 0.5})
+        known = LiteLLMChat("openai/gpt-5-mini", effort="low", api_base=server.url, options=warm)
+        other = LiteLLMChat("openai/other", api_base=server.url, options=warm)
         dropped, kept = known.send(REQUEST).parameters, other.send(REQUEST).parameters
     assert dropped["dropped"] == ["temperature"]
     assert "temperature" not in dropped
@@ -162,9 +156,7 @@ def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
         foreign = LiteLLMChat("openai/gpt-5-mini", api_base=server.url).send(REQUEST)
         hosted = LiteLLMChat("huggingface/openai/gpt-oss-20b", api_base=server.url).send(REQUEST)
         local = LiteLLMChat("ollama_chat/qwen3", api_base=server.root).send(REQUEST)
-        priced = LiteLLMChat(
-            "openai/gpt-5-mini", api_base=server.url, price=Price(prompt=0.25, completion=2.0)
-        ).send(REQUEST)
+        priced = LiteLLMChat("openai/gpt-5-mini", api_base=server.url, price=Price(0.25, 2.0)).send(REQUEST)
         estimated = LiteLLMChat("hosted_vllm/x", api_base=server.url).send(REQUEST)
     assert [r.usage.cost for r in (foreign, hosted, estimated)] == [None] * 3
     assert estimated.usage.estimated and estimated.usage.completion_tokens > 5
@@ -175,11 +167,8 @@ def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
 @pytest.mark.usefixtures("keys")
 def test_reasoning_and_refusals_are_told_apart() -> None:
     refusal = Step(None, extra={"refusal": "I would rather not"})
-    counts: dict[str, Any] = {
-        "prompt_tokens": 100,
-        "completion_tokens": 20,
-        "prompt_tokens_details": {"cached_tokens": 64},
-    }
+    counts: dict[str, Any] = {"prompt_tokens": 100, "completion_tokens": 20}
+    counts["prompt_tokens_details"] = {"cached_tokens": 64}
     counts["completion_tokens_details"] = {"reasoning_tokens": 12}
     ended = "model_context_window_exceeded"
     answer = Step(ended, extra={"reasoning_content": "first I thought"}, usage=counts, finish=ended)
@@ -202,11 +191,8 @@ def test_an_answer_in_a_call_of_a_tool_that_nobody_offered_is_the_answer() -> No
 
 
 def test_a_text_in_parts_or_as_an_object_is_read_as_one() -> None:
-    parts = [
-        {"type": "thinking", "thinking": []},
-        {"type": "text", "text": '{"ration'},
-        {"type": "text", "text": 'ale": ""}'},
-    ]
+    halves = [{"type": "text", "text": half} for half in ('{"ration', 'ale": ""}')]
+    parts = [{"type": "thinking", "thinking": []}, *halves]
     steps = [Step(None, extra={"content": content}) for content in (parts, {"rationale": ""}, [7])]
     with serving(*steps) as server:
         chat = LiteLLMChat("openai/mine", api_base=server.url)

@@ -14,7 +14,8 @@ def test_all_variables_of_a_large_model_have_a_line_each() -> None:
     assert len(model_json(info)["variables"]) == 20_000
 
 
-def test_unbounded_inputs_are_said_to_be_so() -> None:
+def test_unbounded_inputs_and_nominal_values_are_told() -> None:
     lines = info_text(read_info(path("HugeLimits_2"))).splitlines()
     (row,) = [line for line in lines if line.startswith("u ")]
     assert row.split() == ["u", "real", "m", "unbounded", "unbounded", "0"]
+    assert "(nominally 5)" in info_text(read_info(path("Lag_2")))

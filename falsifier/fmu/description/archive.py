@@ -1,6 +1,5 @@
 """Archives of FMUs and other models: checked before any of their contents are written to disk or loaded."""
 
-import errno
 import hashlib
 import platform
 import stat
@@ -12,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-from falsifier.errors import ModelError, ModelFileError
+from falsifier.errors import ModelError, ModelFileError, remedy
 
 try:
     from lzma import LZMAError
@@ -51,8 +50,6 @@ _KINDS = {".ssp": "SSP package", ".slx": "Simulink file"}
 # What reading an entry of a damaged archive raises. RuntimeError stands for entries that are encrypted or
 # compressed by an unknown method, OSError also for damaged bzip2 data, ValueError for names in no encoding.
 UNREADABLE = (zipfile.BadZipFile, zlib.error, LZMAError, EOFError, OSError, RuntimeError, ValueError)
-# What is the machine's fault and not the archive's.
-_EXHAUSTED = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _FORBIDDEN_KINDS = {
     stat.S_IFLNK: "symbolic link",
     stat.S_IFIFO: "named pipe",
@@ -135,7 +132,7 @@ def extract(path: Path, folder: Path) -> None:
         try:
             archive.extractall(folder)
         except UNREADABLE as error:
-            if isinstance(error, OSError) and error.errno in _EXHAUSTED:
+            if isinstance(error, OSError) and remedy(error):  # the machine's fault and not the archive's
                 error.filename = f"{folder}, to which {path} is unpacked"
                 raise
             raise _damaged(f"{path}: cannot be unpacked into {folder}", error) from error

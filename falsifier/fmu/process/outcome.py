@@ -147,10 +147,11 @@ def _status_name(status: int) -> str:
 
 
 def _out_of_time(plan: Plan) -> str:
+    option = written("--time-limit, or time_limit in a spec", "time_limit")
     if plan.has_limit:
-        return f"after the time limit of {plan.time_limit:g} s; slow models need a larger time_limit"
+        return f"after the time limit of {plan.time_limit:g} s; slow models need a larger {option}"
     share = f"{plan.time_limit:g} s without another tenth of the simulated time"
-    return f"after {share}; slow models need a time_limit"
+    return f"after {share}; slow models need {option}"
 
 
 def _changes(network: Network, words: Sequence[str]) -> str:

@@ -48,19 +48,12 @@ _SHOWN_REFUSALS = 3
 
 @dataclass(frozen=True, slots=True)
 class Rights:
-    """What an FMU may do beyond reading files and changing those of its own folders.
+    """What an FMU may do beyond reading files and changing those of its own folders."""
 
-    Attributes:
-        writable: files and folders that it may change and read, with all below.
-        readable: files and folders that it may read although they may hold keys.
-        programs: whether it may execute programs.
-        network: whether it may open connections.
-    """
-
-    writable: tuple[Path, ...] = ()
-    readable: tuple[Path, ...] = ()
-    programs: bool = False
-    network: bool = True
+    writable: tuple[Path, ...] = ()  # files and folders that it may change and read, with all below
+    readable: tuple[Path, ...] = ()  # files and folders that it may read although they may hold keys
+    programs: bool = False  # whether it may execute programs
+    network: bool = True  # whether it may open connections
 
     @classmethod
     def of(cls, allow: Collection[str] = (), deny: Collection[str] = ()) -> "Rights":

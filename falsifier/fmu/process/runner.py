@@ -25,17 +25,13 @@ _LEAST_SECONDS, _DURATIONS = 1.0, 20.0
 
 
 class Runner:
-    """Simulates one FMU or system in a worker.
-
-    Attributes:
-        reuse: how the next simulation starts, whichever process it runs in; None until that was tested.
-        untrusted: ways to start that made the FMU crash or hang.
-    """
+    """Simulates one FMU or system in a worker."""
 
     def __init__(self, workplace: Callable[[], Workplace], order: Order) -> None:
         self._workplace, self._order = workplace, order
+        # How the next simulation starts, whichever process it runs in; None until that was tested.
         self.reuse: Reuse | None = None
-        self.untrusted: tuple[Reuse, ...] = ()
+        self.untrusted: tuple[Reuse, ...] = ()  # ways to start that made the FMU crash or hang
         # The way that is being tested.
         self._trying: Reuse = "reset"
         # How long loading the FMU and its first simulation took at most.

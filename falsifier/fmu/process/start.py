@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from falsifier.core import posix, posix_files
 from falsifier.core.literals import printable
-from falsifier.errors import ModelError
+from falsifier.errors import ModelError, remedy
 from falsifier.fmu.description.archive import OLD_PLATFORMS, this_platform
 from falsifier.fmu.description.libraries import find_wine, windows_path
 from falsifier.fmu.process.rights import Rights, encoded, hidden_places
@@ -148,7 +148,7 @@ class Started:
         except BaseException as error:
             self._close()
             if isinstance(error, OSError):
-                raise ModelError(f"{path} cannot be started: {error}") from error
+                raise ModelError(f"{path} cannot be started: {error}{remedy(error)}") from error
             raise
 
     def end(self) -> int:
