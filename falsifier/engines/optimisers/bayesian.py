@@ -9,7 +9,6 @@ import numpy as np
 from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.engines.layout import Array
 from falsifier.engines.optimisers.conditions import Conditions
-from falsifier.engines.optimisers.gaussian_process import fit_lengths
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
@@ -64,6 +63,9 @@ class Bayesian(BoxEngine):
         return np.asarray(values / np.where(spread > 0.0, spread, 1.0))
 
     def _step(self, points: Array, scores: Array, rng: np.random.Generator) -> Array:
+        # Here, because it loads scipy, which many short searches do without.
+        from falsifier.engines.optimisers.gaussian_process import fit_lengths
+
         d = self.box.dimension
         best = points[int(np.argmin(self._conditions.lowest(scores, scores)))]
         near = np.argsort(np.abs(points - best).max(axis=1), kind="stable")[:_MOST_POINTS]
