@@ -188,7 +188,7 @@ def _details(section: Section, most: int) -> Html:
     runs, first = section.runs, section.shown[:1]
     held = held_text(runs[0].manifest.not_searched)
     histories = [
-        drawn(partial(plot_history, *members), f"Robustness over simulations, {label}")
+        drawn(partial(plot_history, members), f"Robustness over simulations, {label}")
         for label, members in section.by_method.items()
     ]
     if len(runs) > 1:
