@@ -27,11 +27,12 @@ def test_a_damaged_line_is_told_with_its_cure_and_the_run_goes_on_from_there(tmp
     assert len(read_journal(tmp_path)) == 3
     assert Numeric().resume(tmp_path).falsified
     assert len(load_runs(tmp_path)[0].robustness) > 3
-    (tmp_path / "counterexample.json").write_bytes(b"")
-    with pytest.raises(SpecError, match=r"damaged; to write it again: falsifier tools repair"):
-        load_counterexample(tmp_path)
-    done = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)])
-    assert done.output.endswith("falsifier replay writes it again\nrepaired\n")
+    for name, maker in (("counterexample.json", "replay"), ("shrunk.json", "explain --shrink")):
+        (tmp_path / name).write_text("{}")
+        with pytest.raises(SpecError, match=r"damaged; to write it again: falsifier tools repair"):
+            load_counterexample(tmp_path / name)
+        done = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)])
+        assert done.output.endswith(f"falsifier {maker} writes it again\nrepaired\n")
     again = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)]).output
     assert f"nothing is damaged; {simulated(tmp_path)} simulations recorded" in again
 
