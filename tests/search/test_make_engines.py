@@ -73,6 +73,14 @@ def test_a_limit_on_money_needs_a_price() -> None:
     assert engine.name.startswith("hosted_vllm/mine")
 
 
+def test_the_client_is_loaded_before_a_time_limit_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded: list[str] = []
+    monkeypatch.setattr("falsifier.llm.litellm_adapter.load_litellm", lambda: loaded.append("litellm"))
+    for budget, so_far in ((Budget(), []), (Budget(seconds=3.0), ["litellm"])):
+        make_engines(request(llm="hosted_vllm/mine").model_copy(update={"budget": budget}), [PROBLEM], None)
+        assert loaded == so_far
+
+
 def test_several_requirements_of_one_language_model_fall_back_to_different_points() -> None:
     problems = [lag_problem(name="A"), lag_problem(name="B")]
     hybrids = make_engines(request("hybrid", "script"), problems, CHAT)
