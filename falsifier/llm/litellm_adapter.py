@@ -126,10 +126,9 @@ def listed_price(llm: str, *, api_base: str | None = None) -> Price | None:
     """
     if stated_address(llm, api_base) is not None and not known(llm).local:
         return None
+    litellm = load_litellm()
     try:
-        info = load_litellm().get_model_info(llm)
-    except ChatError:
-        raise
+        info = litellm.get_model_info(llm)
     except Exception:  # not in the table
         return None
     prompt, completion = info.get("input_cost_per_token"), info.get("output_cost_per_token")

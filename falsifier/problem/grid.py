@@ -155,10 +155,7 @@ def _text(seconds: Fraction) -> str:
 
 
 def check_steps(stop_time: float, period: float | None, *, key: str | None = None) -> None:
-    """Check that a period in s makes at most MAX_STEPS steps; SpecError naming key and smallest period.
-
-    ``key``: where the period is stated; None: it is the FMU's step.
-    """
+    """Check a period in s, stated at a key or else the FMU's step; SpecError if it makes too many steps."""
     if period is not None and stop_time / period > MAX_STEPS:
         named = f"{key.rpartition('.')[2]} =" if key else "the FMU's step"
         remedy = "" if key else "shorten it, or state an output interval: "

@@ -10,11 +10,7 @@ from falsifier.views.text import Fact, llm_use
 
 
 def markdown_report(*directories: Path) -> str:
-    """Summarize runs or campaigns; several are compared.
-
-    Raises:
-        JournalError: if a directory is neither, or is damaged.
-    """
+    """Summarize runs or campaigns, and compare several; JournalError if one is neither, or is damaged."""
     sides = gather(*directories)
     parts = [f"# Falsification report: {markdown_text(' and '.join(side.title for side in sides))}"]
     for name, sections in by_requirement(sides).items():

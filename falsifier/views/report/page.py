@@ -34,11 +34,7 @@ _FOLDED = ("median S", "std S", "sim. s", "total s", "tokens", "cost $")
 
 
 def html_report(*directories: Path) -> str:
-    """Report on runs or campaigns; several are compared side by side.
-
-    Raises:
-        JournalError: if a directory is neither, or is damaged.
-    """
+    """Report on runs or campaigns, several side by side; JournalError if one is neither, or is damaged."""
     sides = gather(*directories)
     title = " and ".join(side.title for side in sides)
     requirements = by_requirement(sides)

@@ -69,8 +69,7 @@ def test_what_a_model_was_asked_last_is_shown(tmp_path: Path) -> None:
     falsify(impossible(), llm=ScriptedChat(lambda _: "no idea <b>"), budget=2, directory=tmp_path / "run")
     text, _ = Watch(tmp_path / "run").look()
     assert "The last question to the language model" in text and "no idea &lt;b&gt;" in text
-    seen = f"To see the questions to the language model: `falsifier report {tmp_path / 'run'}`"
-    assert seen in markdown_report(tmp_path / "run")
+    assert "To see the questions to the language model: `falsifier" in markdown_report(tmp_path / "run")
     with pytest.raises(JournalError, match="not a run or campaign"):
         Watch(tmp_path / "run" / "trajectories")
 
