@@ -121,7 +121,7 @@ class ModelError(FalsifierError):
 
 
 class ModelFileError(ModelError):
-    """A file that is given as a model is none, such as a text that is called .fmu."""
+    """A file that is given as a model is none, such as a text that is called .fmu, or is refused."""
 
     exit_code = 2
 

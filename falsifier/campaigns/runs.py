@@ -190,11 +190,7 @@ def columns(runs: Iterable[Run]) -> dict[str, list[Any]]:
 
 
 def frame(runs: Iterable[Run]) -> "pandas.DataFrame":
-    """One row per run, as a pandas data frame.
-
-    Raises:
-        SpecError: if pandas is not installed.
-    """
+    """One row per run, as a data frame of pandas; SpecError if that is not installed."""
     return as_frame(columns(runs))
 
 

@@ -74,11 +74,13 @@ def _repair_campaign(directory: Path) -> list[str]:
 
 def _repair_run(directory: Path) -> list[str]:
     findings = repair_run(directory)
-    for path in sorted(directory.glob("counterexample*.json")):
-        try:
-            load_counterexample(path)
-        except SpecError as error:
-            findings.append(f"{error}; kept as {set_aside(path).name}, falsifier replay writes it again")
+    for kind, maker in (("counterexample", "replay"), ("shrunk", "explain --shrink")):
+        for path in sorted(directory.glob(f"{kind}*.json")):
+            try:
+                load_counterexample(path)
+            except SpecError as error:
+                wrong = str(error).partition("; ")[0]
+                findings.append(f"{wrong}; kept as {set_aside(path).name}, falsifier {maker} writes it again")
     return findings
 
 

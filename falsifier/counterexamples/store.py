@@ -159,6 +159,8 @@ def load_counterexample(path: Path | str) -> StoredCounterexample:
         SpecError: naming the file and what is wrong with it.
     """
     file = counterexample_file(path_of("path", path, "the path of a counterexample, or of a run"))
+    is_ours = file.name.startswith(("counterexample", "shrunk")) and holds_run(file.parent)
+    remedy = f"; to write it again: falsifier tools repair {shell_word(file.parent)}" if is_ours else ""
     try:
         content = file.read_bytes()
         stored = StoredCounterexample.model_validate_json(content)
@@ -167,16 +169,16 @@ def load_counterexample(path: Path | str) -> StoredCounterexample:
     except ValidationError as error:
         key, why = first_fault(error)
         if error.errors()[0]["type"] in ("json_invalid", "missing") or not key:
-            key, why = "", "expected the counterexample.json of a run, or a run directory"
-            if file.name.startswith("counterexample") and holds_run(file.parent):
-                why = f"damaged; to write it again: falsifier tools repair {shell_word(file.parent)}"
+            expected = "expected the counterexample.json of a run, or a run directory"
+            key, why = "", f"damaged{remedy}" if remedy else expected
         raise SpecError(f"not a counterexample file: {why}", file=str(file), key=key) from None
     try:
         if stored.sum:
             check_seal(content)
     except ValueError as error:
         raise SpecError(
-            f"damaged or edited: {error}; if it was edited on purpose, delete its key sum", file=str(file)
+            f"damaged or edited: {error}; if it was edited on purpose, delete its key sum{remedy}",
+            file=str(file),
         ) from None
     with in_section(str(file), "candidate"):
         Candidate.from_json(stored.candidate)

@@ -126,10 +126,9 @@ def listed_price(llm: str, *, api_base: str | None = None) -> Price | None:
     """
     if stated_address(llm, api_base) is not None and not known(llm).local:
         return None
+    litellm = load_litellm()
     try:
-        info = load_litellm().get_model_info(llm)
-    except ChatError:
-        raise
+        info = litellm.get_model_info(llm)
     except Exception:  # not in the table
         return None
     prompt, completion = info.get("input_cost_per_token"), info.get("output_cost_per_token")
@@ -152,30 +151,30 @@ def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None 
     is_own = stated_address(llm, api_base) is not None or provider.local or not provider.keys
     if not options or is_own or provider.routes:
         return
-    taken = _options_of(llm)
+    listed, taken = _options_of(llm)
     for name in options:
         if name not in taken:
             given = written(f"--llm-option {name}", name)
             raise ChatSetupError(
-                f"{given}: {provider_of(llm)} has no such option; {did_you_mean(name, taken)}. What litellm "
+                f"{given}: {provider_of(llm)} has no such option; {did_you_mean(name, listed)}. What litellm "
                 "does not know can be sent in Python: connect(NAME, options={'extra_body': {...}})"
             )
 
 
-def _options_of(llm: str) -> list[str]:
-    """Names of what litellm takes for an LLM: first what the LLM does, then the provider's and litellm's."""
+def _options_of(llm: str) -> tuple[list[str], set[str]]:
+    """Names of an LLM's and its provider's options, and of all that litellm takes, its internal ones too."""
     litellm = load_litellm()
     from litellm.types.utils import all_litellm_params
     from litellm.utils import ProviderConfigManager
 
     name, provider, *_ = litellm.get_llm_provider(llm)
-    taken = {*signature(litellm.completion).parameters, *all_litellm_params, "extra_body", "max_retries"}
-    first = litellm.get_supported_openai_params(model=name, custom_llm_provider=provider) or ()
+    own = [*(litellm.get_supported_openai_params(model=name, custom_llm_provider=provider) or ()), "timeout"]
     config = ProviderConfigManager.get_provider_chat_config(name, litellm.LlmProviders(provider))
     for kind in type(config).__mro__:
-        taken |= {key for key in getattr(kind, "__annotations__", {}) if key.islower()}
-    ordered = dict.fromkeys((*first, *sorted(taken - {"kwargs", "self"})))
-    return [name for name in ordered if name[0] != "_"]
+        stated = getattr(kind, "__annotations__", {})
+        own += [key for key in stated if key.islower() and key[0] != "_" and key not in own]
+    others = {*signature(litellm.completion).parameters, *all_litellm_params, "extra_body", "max_retries"}
+    return own, {name for name in (*own, *others) if name[0] != "_"} - {"kwargs", "self"}
 
 
 def dropped_parameters(llm: str, arguments: Mapping[str, Any]) -> tuple[str, ...]:

@@ -60,7 +60,7 @@ def choose_grid(
             short for the stop time.
     """
     # Otherwise the search below for a round interval would take minutes.
-    check_steps(stop_time, fmu_step or None, key="model.output_interval")
+    check_steps(stop_time, fmu_step or None)
     check_steps(stop_time, step_size, key="model.step_size")
     stop = exact(stop_time)
     named = sorted({t for t in map(exact, times) if 0 < t <= stop})
@@ -81,8 +81,7 @@ def choose_grid(
         rounded = stop / _DEFAULT_INTERVALS
         raise SpecError(
             f"no grid of at most {_MAX_INTERVALS} intervals fits {_fitting(stop, named)}; round these times, "
-            f"for example to multiples of {_text(rounded)} s",
-            key="model.output_interval",
+            f"for example to multiples of {_text(rounded)} s"
         )
     fits = _fitting(stop, named)
     reason = _reason(interval, fits, stop_time, fmu_step or internal_step, step_size)
@@ -155,12 +154,14 @@ def _text(seconds: Fraction) -> str:
     return f"{float(seconds):.10g}"
 
 
-def check_steps(stop_time: float, period: float | None, *, key: str) -> None:
-    """Check that a period in s makes at most MAX_STEPS steps; SpecError naming key and smallest period."""
+def check_steps(stop_time: float, period: float | None, *, key: str | None = None) -> None:
+    """Check a period in s, stated at a key or else the FMU's step; SpecError if it makes too many steps."""
     if period is not None and stop_time / period > MAX_STEPS:
+        named = f"{key.rpartition('.')[2]} =" if key else "the FMU's step"
+        remedy = "" if key else "shorten it, or state an output interval: "
         raise SpecError(
-            f"{period:g} s gives more than {MAX_STEPS:,} steps up to the stop time {stop_time:.10g} s; "
-            f"the smallest value is {stop_time / MAX_STEPS:g}",
+            f"{named} {period:g} s gives more than {MAX_STEPS:,} steps up to the stop time "
+            f"{stop_time:.10g} s; {remedy}the smallest value is {stop_time / MAX_STEPS:g}",
             key=key,
         )
 

@@ -283,15 +283,20 @@ def _nothing_to_search(info: ModelInfo, changes: ModelChanges) -> SpecError:
     """Return the error that says what keeps everything constant, and what lets something vary."""
     kept = [name for name, _ in changes.variables]
     bounded = [v.name for v in info.inputs if v.is_bounded]
-    why = "no input has a range"
+    known, kind, add = list(info.inputs), "inputs", searching("inputs", "NAME")
+    why, section = "no input has a range", "[inputs.NAME] with range and control_points, or "
+    if not known:
+        known = [v for v in info.variables if v.settable and v.kind != "string"]
+        known.sort(key=lambda v: v.causality != "parameter")
+        kind, add = "parameters and start values", searching("parameters", "NAME")
+        why, section = f"the {info.noun} has no input", ""
     if kept:
         why = f"{written('--set keeps', 'a value keeps')} {listed(kept)} constant"
     elif bounded:
         why = f"{listed(bounded)} would be searched between min and max if a section [inputs.NAME] named them"
     return SpecError(
-        f"nothing to search: {why}, and nothing else varies; add {searching('inputs', 'NAME')}, or to a spec "
-        "[inputs.NAME] with range and control_points, or [parameters.NAME] with range; inputs "
-        f"{did_you_mean('', (v.name for v in info.inputs))}"
+        f"nothing to search: {why}, and nothing else varies; add {add}, or to a spec "
+        f"{section}[parameters.NAME] with range; {kind} {did_you_mean('', (v.name for v in known))}"
     )
 
 

@@ -39,8 +39,12 @@ def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | 
         name = request.engine or DEFAULT_ENGINE
         return [make_engine(name, problem, seed=seed) for problem, seed in seeded]
     from falsifier.engines.llm import LLMEngine
+    from falsifier.llm.client import LiteLLMChat
+    from falsifier.llm.litellm_adapter import load_litellm
 
     chat = chat or open_chat(llm, max_cost=request.budget.cost)
+    if request.budget.seconds is not None and isinstance(chat, LiteLLMChat):
+        load_litellm()  # takes seconds, which do not count before the search begins
     engines: list[Engine] = []
     for problem, seed in seeded:
         led = LLMEngine(problem, chat, variant=llm.variant, sample=request.seed, anonymous=llm.anonymous)

@@ -96,11 +96,7 @@ class Result:
         return evaluation_columns(self.evaluations)
 
     def frame(self) -> "pandas.DataFrame":
-        """Return the same as a data frame of pandas.
-
-        Raises:
-            SpecError: if pandas is not installed.
-        """
+        """Return the same as a data frame of pandas; SpecError if that is not installed."""
         return frame(self.columns())
 
 
@@ -196,11 +192,7 @@ def evaluation_columns(evaluations: Sequence[Evaluation]) -> Columns:
 
 
 def frame(columns: Columns) -> "pandas.DataFrame":
-    """Return columns as a data frame.
-
-    Raises:
-        SpecError: if pandas is not installed.
-    """
+    """Return columns as a data frame of pandas; SpecError if that is not installed."""
     try:
         import pandas
     except ImportError:

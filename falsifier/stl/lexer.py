@@ -48,12 +48,13 @@ UNITS = {
     "us": Decimal("1e-6"), "ms": Decimal("1e-3"), "s": Decimal(1), "min": Decimal(60), "h": Decimal(3600),
 }  # fmt: skip
 _PAST = (
-    "there are no operators on the past; for 20 s, write G (a -> once[0,2] b) as "
-    "G[0,18] (F[2,2] a -> F[0,2] b), which begins at 2 s"
+    "there are no operators on the past; for 20 s, write G (a -> {0}[0,2] b) as "
+    "G[0,18] (F[2,2] a -> {1}[0,2] b), which begins at 2 s"
 )
 # What was meant by a name; single capitals are operators only as they are written.
 _INSTEAD = {
-    **dict.fromkeys(("once", "historically", "since", "previous", *"HOPSY"), _PAST),
+    **dict.fromkeys(("once", "since", "previous", *"OPSY"), _PAST.format("once", "F")),
+    **dict.fromkeys(("historically", "H"), _PAST.format("historically", "G")),
     **dict.fromkeys(("W", "weak_until", "weakuntil"), "a W b is ((a or b) U b) or G a"),
     **dict.fromkeys(("R", "release"), "a R b is (b U (a and b)) or G b"),
     "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",

@@ -124,6 +124,7 @@ def test_a_sentence_has_its_readings(server: Server, target: str, sentence: str,
 GOOD = "G[0,20] (speed <= 120)"
 LOW = [{"name": "speed", "times": [0, 50], "values": [0, 0]}]
 HIGH = [{"name": "speed", "times": [0, 50], "values": [200, 200]}]
+READING = {"formula": GOOD, "satisfied": LOW, "violated": HIGH}
 RISING = [{"name": "speed", "times": [0, 20], "values": [0, 180]}]
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
     "unknown signal": ({"formula": "G[0,20] (sped <= 120)"}, "unknown signal 'sped'; did you mean 'speed'"),
@@ -186,32 +187,29 @@ def test_a_reading_may_name_what_is_no_output(server: Server, target: str) -> No
     ],
 )
 def test_replies_of_another_form_are_rejected(server: Server, target: str, content: str, reason: str) -> None:
-    good = {"formula": GOOD, "satisfied": LOW, "violated": HIGH}
-    found = ask(server, target, Step(content), replying(good))
+    found = ask(server, target, Step(content), replying(READING))
     assert len(found.readings) == 1
     assert reason in server.received[1].texts[-1]
 
 
 def test_the_same_reading_twice_is_one(server: Server, target: str) -> None:
-    good = {"formula": GOOD, "satisfied": LOW, "violated": HIGH}
-    again = good | {"formula": "G[0,20] (120 >= speed)"}
-    found = ask(server, target, replying(good, again), replying(good))
+    again = READING | {"formula": "G[0,20] (120 >= speed)"}
+    found = ask(server, target, replying(READING, again), replying(READING))
     assert "requires the same as reading 1" in found.rejected[0]
 
 
 def test_after_the_last_attempt_the_valid_readings_are_kept(server: Server, target: str) -> None:
-    good = {"formula": GOOD, "satisfied": LOW, "violated": HIGH}
-    bad = good | {"formula": "G[0,60] (speed <= 120)"}
-    found = ask(server, target, replying(good, bad), replying(bad), replying(bad))
+    bad = READING | {"formula": "G[0,60] (speed <= 120)"}
+    found = ask(server, target, replying(READING, bad), replying(bad), replying(bad))
     assert [str(r.formula) for r in found.readings] == [GOOD]
     assert len(found.rejected) == 3
     cannot = Step(json.dumps({"readings": [], "cannot": "No."}))
-    assert len(ask(server, target, replying(good, bad), cannot).readings) == 1
-    found = ask(server, target, replying(good, bad), Step(status=401, message="wrong key"))
+    assert len(ask(server, target, replying(READING, bad), cannot).readings) == 1
+    found = ask(server, target, replying(READING, bad), Step(status=401, message="wrong key"))
     assert len(found.readings) == 1 and "no better answer came" in found.rejected[-1]
     late = ChatError("no complete reply")
     late.lost = Usage(prompt_tokens=70, without_reply=1)
-    found = formalize(target, "It is slow.", ScriptedChat([str(replying(good, bad).content), late]))
+    found = formalize(target, "It is slow.", ScriptedChat([str(replying(READING, bad).content), late]))
     assert (found.spent.calls, found.spent.tokens, found.spent.without_reply) == (2, 70, 1)
     with pytest.raises(ChatError, match="no valid reply in 3 attempts"):
         ask(server, target, *[replying(bad)] * 3)
@@ -220,9 +218,8 @@ def test_after_the_last_attempt_the_valid_readings_are_kept(server: Server, targ
 def test_readings_on_different_grids_are_told_apart(server: Server, target: str, tmp_path: Path) -> None:
     free = tmp_path / "free.toml"
     free.write_text(SPEC.replace("output_interval = 0.1\n", ""))
-    good = {"satisfied": LOW, "violated": HIGH}
     texts = ["G[0,12.5] (speed <= 120)", "G[0,0.24] (speed <= 120)"]
-    found = ask(server, str(free), replying(*({"formula": text} | good for text in texts)))
+    found = ask(server, str(free), replying(*(READING | {"formula": text} for text in texts)))
     assert [str(r.formula) for r in found.readings] == texts
     assert found.differences[0].only_first is None
     assert found.differences[0].only_second is not None

@@ -2,17 +2,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner
 
 from falsifier.campaigns.analysis import load as load_runs
-from falsifier.cli import cli
 from falsifier.counterexamples.store import load_counterexample
 from falsifier.errors import JournalError, SpecError
 from falsifier.record.journal import read_journal, simulated
 from tests.hostile.test_damage import Numeric, Standing
 
 
-def test_a_damaged_line_is_told_with_its_cure_and_the_run_goes_on_from_there(tmp_path: Path) -> None:
+def test_a_damaged_line_is_told_with_its_cure_and_the_run_goes_on(command: Any, tmp_path: Path) -> None:
     Numeric().run(tmp_path)
     path = tmp_path / "journal.jsonl"
     lines = path.read_bytes().splitlines(keepends=True)
@@ -20,19 +18,20 @@ def test_a_damaged_line_is_told_with_its_cure_and_the_run_goes_on_from_there(tmp
     path.write_bytes(b"".join(lines))
     with pytest.raises(JournalError, match=r"line 4 is damaged: its checksum .* falsifier tools repair"):
         read_journal(tmp_path)
-    done = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)])
+    done = command("tools", "repair", str(tmp_path))
     assert done.exit_code == 0, done.output
     assert "line 4 is damaged" in done.output
     assert (tmp_path / "journal.jsonl.damaged-1").read_bytes() == b"".join(lines)
     assert len(read_journal(tmp_path)) == 3
     assert Numeric().resume(tmp_path).falsified
     assert len(load_runs(tmp_path)[0].robustness) > 3
-    (tmp_path / "counterexample.json").write_bytes(b"")
-    with pytest.raises(SpecError, match=r"damaged; to write it again: falsifier tools repair"):
-        load_counterexample(tmp_path)
-    done = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)])
-    assert done.output.endswith("falsifier replay writes it again\nrepaired\n")
-    again = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path)]).output
+    for name, maker in (("counterexample.json", "replay"), ("shrunk.json", "explain --shrink")):
+        (tmp_path / name).write_text("{}")
+        with pytest.raises(SpecError, match=r"damaged; to write it again: falsifier tools repair"):
+            load_counterexample(tmp_path / name)
+        done = command("tools", "repair", str(tmp_path))
+        assert done.output.endswith(f"falsifier {maker} writes it again\nrepaired\n")
+    again = command("tools", "repair", str(tmp_path)).output
     assert f"nothing is damaged; {simulated(tmp_path)} simulations recorded" in again
 
 

@@ -8,6 +8,7 @@ from falsifier.core.model import Experiment
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError, SimulationError, SpecError
 from falsifier.evaluation.confirm import (
+    Confirmation,
     Movement,
     confirm,
     half_step,
@@ -33,14 +34,17 @@ def highest(problem: Problem) -> Evaluation:
     return evaluate(problem, problem.space.decode([1.0] * 4))
 
 
+def confirmed(problem: Problem) -> Confirmation:
+    return confirm(problem, highest(problem))
+
+
 def test_half_the_step_needs_no_monitor_of_its_own() -> None:
     problem = euler_problem("G[1,1] (x <= 0.6)")
     assert monitor_for(half_step(problem)) is monitor_for(problem)
 
 
 def test_a_violation_that_stays_at_half_the_step_is_confirmed() -> None:
-    problem = euler_problem("G[1,1] (x <= 0.6)")
-    found = confirm(problem, highest(problem))
+    found = confirmed(euler_problem("G[1,1] (x <= 0.6)"))
     assert found.outcome == "confirmed"
     assert found.robustness == found.reference == pytest.approx(0.6 - COARSE)
     assert found.halved == pytest.approx(0.6 - FINE)
@@ -48,8 +52,7 @@ def test_a_violation_that_stays_at_half_the_step_is_confirmed() -> None:
 
 
 def test_a_violation_that_vanishes_at_half_the_step_is_fragile_and_says_by_how_much() -> None:
-    problem = euler_problem("G[1,1] (x <= 0.65)")
-    found = confirm(problem, highest(problem))
+    found = confirmed(euler_problem("G[1,1] (x <= 0.65)"))
     assert COARSE > 0.65 > FINE
     assert found.outcome == "fragile"
     assert found.halved == pytest.approx(0.65 - FINE)
@@ -58,16 +61,14 @@ def test_a_violation_that_vanishes_at_half_the_step_is_fragile_and_says_by_how_m
 
 
 def test_a_model_without_a_communication_step_says_so() -> None:
-    problem = lag_problem()
-    found = confirm(problem, highest(problem))
+    found = confirmed(lag_problem())
     assert found.outcome == "confirmed"
     assert found.halved == found.robustness
     assert "do not depend on the communication step" in found.reason
 
 
 def test_a_step_that_the_model_refuses_is_said_and_does_not_refute() -> None:
-    problem = euler_problem("G[1,1] (x <= 0.6)", smallest_step=0.08)
-    found = confirm(problem, highest(problem))
+    found = confirmed(euler_problem("G[1,1] (x <= 0.6)", smallest_step=0.08))
     assert (found.outcome, found.halved) == ("confirmed", None)
     assert "(0.05 s) it failed: the step 0.05 s is too small" in found.reason
 
@@ -82,7 +83,7 @@ def test_what_does_not_happen_again_is_refuted() -> None:
 
 def test_a_violation_that_recurs_with_other_numbers_says_so() -> None:
     problem = lag_problem()
-    assert "equal inputs" not in confirm(problem, highest(problem)).reason
+    assert "equal inputs" not in confirmed(problem).reason
     found = confirm(replace(problem, parameters={"gain": 0.95}), highest(problem))
     assert found.outcome == "confirmed"
     assert found.reason.startswith(
@@ -94,16 +95,14 @@ def test_a_violation_that_recurs_with_other_numbers_says_so() -> None:
     ("formula", "outcome"), [("G[0,10] (x - x <= 0)", "refuted"), ("G[0,10] (x - x < 0)", "confirmed")]
 )
 def test_exactly_on_the_limit_the_comparison_decides(formula: str, outcome: str) -> None:
-    problem = lag_problem(formula)
-    found = confirm(problem, highest(problem))
+    found = confirmed(lag_problem(formula))
     assert (found.outcome, found.robustness == found.reference) == (outcome, True)
     assert ("a fresh simulation gives -0, " in found.reason) == (outcome == "confirmed")
 
 
 def test_monitors_that_disagree_refute(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = lag_problem()
     monkeypatch.setattr(second_monitor, "robustness", lambda formula, trajectory: 0.25)
-    found = confirm(problem, highest(problem))
+    found = confirmed(lag_problem())
     assert (found.outcome, found.reference) == ("refuted", 0.25)
     assert "but rtamt computes +0.25" in found.reason
 
@@ -112,9 +111,8 @@ def test_without_the_second_monitor_nothing_is_confirmed(monkeypatch: pytest.Mon
     def fail(formula: object, trajectory: object) -> float:
         raise MonitorError("out of order")
 
-    problem = lag_problem()
     monkeypatch.setattr(second_monitor, "robustness", fail)
-    found = confirm(problem, highest(problem))
+    found = confirmed(lag_problem())
     assert (found.outcome, found.reference) == ("refuted", None)
     assert "could not be evaluated by rtamt: out of order" in found.reason
 

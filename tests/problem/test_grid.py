@@ -61,7 +61,7 @@ def test_the_grid_is_a_multiple_of_a_stated_communication_step() -> None:
 
 
 def test_times_that_fit_no_reasonable_grid_are_an_error() -> None:
-    with pytest.raises(SpecError, match=r"no grid of at most 100000 intervals .* round these times"):
+    with pytest.raises(SpecError, match=r"^no grid of at most 100000 intervals .* round these times"):
         choose_grid(10.0, times=[3.14159265, 2.71828183])
     with pytest.raises(SpecError, match=r"stop time 86399\.95 s and the formula's times 1\.0000001 s"):
         choose_grid(86399.95, times=[1.0000001])
@@ -71,7 +71,9 @@ def test_times_that_fit_no_reasonable_grid_are_an_error() -> None:
 def test_a_step_that_is_far_too_short_for_the_stop_time_is_an_error(
     fmu_step: float | None, step_size: float | None
 ) -> None:
-    with pytest.raises(SpecError, match=r"gives more than 10,000,000 steps up to the stop time 10 s"):
+    with pytest.raises(
+        SpecError, match=r"^(the FMU's step|.*step_size =) \S+ s gives more than 10,000,000 steps"
+    ):
         choose_grid(10.0, fmu_step=fmu_step, step_size=step_size)
 
 

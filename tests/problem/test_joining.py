@@ -212,9 +212,9 @@ def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_th
     assert held["in_Boolean"] == (1.0, "its value is given")
 
 
-def test_an_fmu_without_bounded_inputs_says_what_to_give(tmp_path: Path) -> None:
+def test_an_fmu_without_inputs_says_what_to_give(tmp_path: Path) -> None:
     low = RequirementSection(formula="G[0,1] (h >= -9)")
-    with pytest.raises(SpecError, match=r"inputs=\{'NAME': \(LOW, HIGH\)\}"):
+    with pytest.raises(SpecError, match=r"add parameters=\{'NAME': \(LOW, HIGH\)\}, .* known: g, e, h"):
         join_formula(fixture("Ball_2"), low, changes=changes_from_options(stop_time=1.0))
     with pytest.raises(SpecError, match=r"gone\.fmu"):
         join_formula(tmp_path / "gone.fmu", low, changes=changes_from_options())

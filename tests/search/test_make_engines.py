@@ -16,8 +16,8 @@ from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.testing import lag_problem
 
 PROBLEM = lag_problem()
+PROBLEMS = [lag_problem(name="A"), lag_problem(name="B")]
 CHAT = ScriptedChat([], llm="script")
-
 BASE = "http://127.0.0.1:9"
 
 
@@ -39,9 +39,8 @@ def test_a_language_model_alone_leads_and_with_the_hybrid_advises() -> None:
 
 
 def test_several_requirements_have_engines_that_draw_different_points() -> None:
-    problems = [lag_problem(name="A"), lag_problem(name="B")]
-    one, other = make_engines(request("uniform"), problems, None)
-    (alone,) = make_engines(request("uniform"), problems[:1], None)
+    one, other = make_engines(request("uniform"), PROBLEMS, None)
+    (alone,) = make_engines(request("uniform"), PROBLEMS[:1], None)
     assert one.ask()[0].key == alone.ask()[0].key
     assert one.ask()[0].key != other.ask()[0].key
 
@@ -73,9 +72,16 @@ def test_a_limit_on_money_needs_a_price() -> None:
     assert engine.name.startswith("hosted_vllm/mine")
 
 
+def test_the_client_is_loaded_before_a_time_limit_begins(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded: list[str] = []
+    monkeypatch.setattr("falsifier.llm.litellm_adapter.load_litellm", lambda: loaded.append("litellm"))
+    for budget, so_far in ((Budget(), []), (Budget(seconds=3.0), ["litellm"])):
+        make_engines(request(llm="hosted_vllm/mine").model_copy(update={"budget": budget}), [PROBLEM], None)
+        assert loaded == so_far
+
+
 def test_several_requirements_of_one_language_model_fall_back_to_different_points() -> None:
-    problems = [lag_problem(name="A"), lag_problem(name="B")]
-    hybrids = make_engines(request("hybrid", "script"), problems, CHAT)
+    hybrids = make_engines(request("hybrid", "script"), PROBLEMS, CHAT)
     surrogates = [hybrid.surrogate for hybrid in hybrids if isinstance(hybrid, Hybrid)]
     one, other = ([candidate.key for candidate in each.ask(12)] for each in surrogates)
     assert one != other

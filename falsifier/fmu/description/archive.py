@@ -76,8 +76,8 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open an FMU, SSP package or Simulink file after checking its entries.
 
     Raises:
-        ModelFileError: if it is not a zip archive.
-        ModelError: if it cannot be read, or would write outside its folder or fill the disk.
+        ModelFileError: if it is not a zip archive, or would write outside its folder or fill the disk.
+        ModelError: if it cannot be read.
     """
     try:
         archive = zipfile.ZipFile(path)
@@ -91,7 +91,7 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
             entry.filename = entry.filename.replace("\\", "/")
         archive.NameToInfo = {entry.filename: entry for entry in archive.infolist()}
         for fault in _faults(archive.infolist()):
-            raise ModelError(f"{path}: {fault}")
+            raise ModelFileError(f"{path}: {fault}")
         yield archive
 
 
@@ -99,14 +99,14 @@ def read_entry(path: Path, name: str, first: int | None = None) -> bytes:
     """Return the contents of one text file of an FMU, or the first bytes of any file.
 
     Raises:
-        ModelFileError: if the archive does not contain the file, or is damaged.
-        ModelError: if the archive is rejected, or the file is too large.
+        ModelFileError: if the archive is damaged or rejected, or has no such file or a too large one.
+        ModelError: if it cannot be read.
     """
     with open_archive(path) as archive:
         try:
             size = archive.getinfo(name).file_size
             if first is None and size > _MAX_TEXT_BYTES:
-                raise ModelError(
+                raise ModelFileError(
                     f"{path}: {name} has {size >> 20} MiB, more than {_MAX_TEXT_BYTES >> 20}; export the "
                     "model with fewer variables"
                 )
@@ -124,8 +124,7 @@ def extract(path: Path, folder: Path) -> None:
     """Unpack an FMU into a folder after checking its entries.
 
     Raises:
-        ModelFileError: if the archive is damaged.
-        ModelError: if it is rejected.
+        ModelFileError: if the archive is damaged or rejected.
         OSError: if the machine has no room for it, or allows no files so large.
     """
     with open_archive(path) as archive:

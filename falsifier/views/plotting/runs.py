@@ -20,13 +20,14 @@ Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 _MOST_DRAWN = 1000
 
 
-def plot_history(*runs: Run, ax: "Axes | None" = None) -> "Figure":
-    """Plot the robustness of each simulation of runs, the smallest so far, and the counterexamples.
+def plot_history(runs: Run | Iterable[Run], ax: "Axes | None" = None) -> "Figure":
+    """Plot the robustness of each simulation of one or more runs, the smallest so far, and counterexamples.
 
-    The runs, from load or load_run, have one requirement and method. Of a long one, the smallest robustness
-    in each of a thousand equal parts is drawn.
+    The title is that of the first run. Of a long one, the smallest robustness in each of a thousand equal
+    parts is drawn.
     """
     ax = ax if ax is not None else own_axes(9.0, 3.2)
+    runs = [runs] if isinstance(runs, Run) else list(runs)
     for run in runs:
         each = thinned(run.robustness, _MOST_DRAWN)
         ax.plot(*each, ".", color=Colour.EACH, markersize=4, label="robustness")

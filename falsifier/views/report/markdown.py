@@ -3,18 +3,14 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from falsifier.core.literals import markdown_code, markdown_text, one_line
+from falsifier.core.literals import markdown_code, markdown_text, one_line, shell_word
 from falsifier.views.report import wording
 from falsifier.views.report.content import Section, Shown, Side, by_requirement, gather, spent_on
 from falsifier.views.text import Fact, llm_use
 
 
 def markdown_report(*directories: Path) -> str:
-    """Summarize runs or campaigns; several are compared.
-
-    Raises:
-        JournalError: if a directory is neither, or is damaged.
-    """
+    """Summarize runs or campaigns, and compare several; JournalError if one is neither, or is damaged."""
     sides = gather(*directories)
     parts = [f"# Falsification report: {markdown_text(' and '.join(side.title for side in sides))}"]
     for name, sections in by_requirement(sides).items():
@@ -72,7 +68,11 @@ def _found(shown: Shown) -> list[str]:
         parts.append(f"Confirmed: {markdown_text(one_line(shown.confirmed))}.")
     if beside := wording.margin_beside(shown):
         parts.append(_facts(beside))
-    parts += [f"{what}: {markdown_code(command)}" for what, command in wording.advice(shown)]
+    advice = wording.advice(shown)
+    if shown.run.spent.questions:  # too long for a text
+        page = f"falsifier report {shell_word(shown.run.directory)}"
+        advice.append(("To see the questions to the language model", page))
+    parts += [f"{what}: {markdown_code(command)}" for what, command in advice]
     return parts
 
 

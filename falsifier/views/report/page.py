@@ -34,11 +34,7 @@ _FOLDED = ("median S", "std S", "sim. s", "total s", "tokens", "cost $")
 
 
 def html_report(*directories: Path) -> str:
-    """Report on runs or campaigns; several are compared side by side.
-
-    Raises:
-        JournalError: if a directory is neither, or is damaged.
-    """
+    """Report on runs or campaigns, several side by side; JournalError if one is neither, or is damaged."""
     sides = gather(*directories)
     title = " and ".join(side.title for side in sides)
     requirements = by_requirement(sides)
@@ -188,7 +184,7 @@ def _details(section: Section, most: int) -> Html:
     runs, first = section.runs, section.shown[:1]
     held = held_text(runs[0].manifest.not_searched)
     histories = [
-        drawn(partial(plot_history, *members), f"Robustness over simulations, {label}")
+        drawn(partial(plot_history, members), f"Robustness over simulations, {label}")
         for label, members in section.by_method.items()
     ]
     if len(runs) > 1:

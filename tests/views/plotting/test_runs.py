@@ -13,7 +13,7 @@ from tests.views.plotting.support import xs, ys
 
 def test_a_history_shows_every_simulation_and_the_counterexample(campaign: Path) -> None:
     found = next(run for run in load(campaign) if run.falsified)
-    figure = plot_history(found)
+    figure = plot_history([found])
     lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
     recorded = list(recorded_evaluations(read_journal(found.directory), "HARD").values())
     assert ys(lines["robustness"]).tolist() == [e.robustness for e in recorded]

@@ -18,7 +18,7 @@ from falsifier.record.run import falsify, resume
 from falsifier.search.events import Evaluated, Event
 from falsifier.testing import lag_problem
 from falsifier.views.html import Html
-from falsifier.views.report import watch as module
+from falsifier.views.report import markdown_report, watch as module
 from falsifier.views.report.watch import Watch, serve
 from tests.campaigns.support import request, work_in_threads
 from tests.patience import HANG
@@ -69,6 +69,7 @@ def test_what_a_model_was_asked_last_is_shown(tmp_path: Path) -> None:
     falsify(impossible(), llm=ScriptedChat(lambda _: "no idea <b>"), budget=2, directory=tmp_path / "run")
     text, _ = Watch(tmp_path / "run").look()
     assert "The last question to the language model" in text and "no idea &lt;b&gt;" in text
+    assert "To see the questions to the language model: `falsifier" in markdown_report(tmp_path / "run")
     with pytest.raises(JournalError, match="not a run or campaign"):
         Watch(tmp_path / "run" / "trajectories")
 
