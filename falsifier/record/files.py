@@ -141,8 +141,9 @@ def can_be_a_folder(directory: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno not in _NO_FOLDER:
             raise
+        gone = ", or change to another if the current folder was deleted" * (error.errno == errno.ENOENT)
         raise JournalError(
-            f"{directory}: no folder can be made here ({error.strerror}); choose another directory"
+            f"{directory}: no folder can be made here ({error.strerror}); choose another directory{gone}"
         ) from None
 
 
