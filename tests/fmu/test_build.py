@@ -15,6 +15,7 @@ from falsifier.errors import ModelError
 from falsifier.fmu import FmuModel, read_info
 from falsifier.fmu.build import compile_sources
 from falsifier.fmu.description.archive import read_entry, this_platform
+from falsifier.fmu.process.start import _libraries
 from tests.fixtures.archives import packed
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ramp, run
@@ -149,13 +150,23 @@ def test_libraries_beside_that_of_an_fmu_are_found_but_none_that_its_process_nee
     place, stub = "binaries/linux64/", tmp_path / "stub.c"
     stub.write_text("int unused;")
     (tmp_path / "libhelper.so").write_bytes(read_entry(fixtures.path("Lag_2"), f"{place}Lag.so"))
-    (tmp_path / "libm.so.6").write_text("no library: whoever loads it fails")
-    linked = [str(stub), "-L.", "-Wl,--no-as-needed", "-l:libhelper.so", "-o", "Lag.so"]
-    compile_c(tmp_path, tmp_path, ["-shared", "-fPIC", *linked])
+    (tmp_path / "libpthread.so.0").write_bytes((tmp_path / "libhelper.so").read_bytes())
+    needed = ["-Wl,--no-as-needed", "-l:libhelper.so", "-l:libpthread.so.0", "-o", "Lag.so"]
+    compile_c(tmp_path, tmp_path, ["-shared", "-fPIC", str(stub), "-L.", *needed])
     files: dict[str, str | bytes] = {
-        place + name: (tmp_path / name).read_bytes() for name in ("Lag.so", "libhelper.so", "libm.so.6")
+        place + name: (tmp_path / name).read_bytes() for name in ("Lag.so", "libhelper.so")
     }
+    files |= dict.fromkeys(
+        (f"{place}libm.so.6", f"{place}libpthread.so.0"), "no library: it cannot be loaded"
+    )
     files["modelDescription.xml"] = read_entry(fixtures.path("Lag_2"), "modelDescription.xml")
     models = FmuModel(packed(tmp_path / "a.fmu", files)), fixtures.isolated("Lag_2")
     found, known = (run(model, ("y",), signals={"u": ramp(1.0)})["y"].tolist() for model in models)
     assert found == known
+    own = (tmp_path / "0" / place) / "liba.so"
+    own.parent.mkdir(parents=True)
+    for name in ("liba.so", "Lag.so"):
+        own.with_name(name).write_text("")
+    libraries = _libraries(tmp_path)
+    own.with_name("libb.so").write_text("")  # by an FMU that runs
+    assert _libraries(tmp_path) == libraries and own in libraries
