@@ -78,7 +78,8 @@ def _repair_run(directory: Path) -> list[str]:
         try:
             load_counterexample(path)
         except SpecError as error:
-            findings.append(f"{error}; kept as {set_aside(path).name}, falsifier replay writes it again")
+            fault = str(error).partition("; to write it again")[0]
+            findings.append(f"{fault}; kept as {set_aside(path).name}, falsifier replay writes it again")
     return findings
 
 

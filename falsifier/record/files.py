@@ -52,7 +52,7 @@ def read_sealed(path: Path, kind: type[Content], *, what: str) -> Content:
     except ValidationError as error:
         raise JournalError(": ".join((str(path), *first_fault(error)))) from None
     except (ValueError, OSError) as error:
-        campaign = path.parent.parent.parent
+        campaign = path.absolute().parent.parent.parent
         remedy = f"this {what} cannot be continued: start a new one"
         if what == "run" and (campaign / CAMPAIGN).exists():
             remedy = f"to let the campaign repeat this run: falsifier tools repair {shell_word(campaign)}"
