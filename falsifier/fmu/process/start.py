@@ -187,13 +187,8 @@ def _with_libraries(environment: dict[str, str], program: Path, folder: Path, li
     """Return an environment in which FMUs find the libraries beside their own, as in importers elsewhere.
 
     The process that watches the FMU, which nothing confines, has the same environment. So what the program
-    itself needs is never taken from an FMU.
-
-    Args:
-        environment: that of the program.
-        program: what will be started.
-        folder: to which the FMUs were unpacked, each to a folder of its own.
-        links: a new folder for links to the libraries, made if there are any.
+    itself needs is never taken from an FMU. The FMUs were unpacked to ``folder``, each to one of its own; the
+    folder ``links`` is made for links to their libraries, if there are any.
     """
     libraries, known = _libraries(folder), environment.get(_LIBRARY_PATH)
     # The system's loader reads such a path as several, or replaces names of its own in it.
