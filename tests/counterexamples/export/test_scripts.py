@@ -202,10 +202,8 @@ def test_the_replay_script_says_on_which_platforms_fmpy_runs_the_fmu() -> None:
     assert not list(replay_notes(problem.model))
     for name, platform in (("Lag_2", "x86_64-linux"), ("win64/Lag_2", "x86_64-windows")):
         model = FmuModel(fmu_path(name))
-        script = replay_script(replace(problem, model=model), evaluation, ["u"])
-        assert (
-            script is not None and f"FMPy runs this FMU on {platform}, for" in script.partition("import")[0]
-        )
+        script = str(replay_script(replace(problem, model=model), evaluation, ["u"]))
+        assert f"FMPy runs this FMU on {platform}, for" in script.partition("import")[0]
     assert "x86_64-windows, for" in (note := "".join(replay_notes(model)))
     assert note.endswith("this is x86_64-linux, where it needs a program wine64")
 
