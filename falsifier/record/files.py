@@ -141,6 +141,7 @@ def can_be_a_folder(directory: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno not in _NO_FOLDER:
             raise
+        directory.absolute()  # OSError if it is relative and the current folder was deleted
         raise JournalError(
             f"{directory}: no folder can be made here ({error.strerror}); choose another directory"
         ) from None

@@ -124,8 +124,7 @@ def last_lines(log: tuple[str, ...]) -> str:
 def _other_step(member: Member, step: float, log: tuple[str, ...]) -> str:
     """Say which step to state for an FMU that refuses the one that it was asked for.
 
-    Empty if a message of it, other than that something is ok, says why it failed, and that is no step; nor
-    does it declare another one.
+    Empty if a message, not of status ok, says why it failed, and that is no step; nor does it declare one.
     """
     option = written("--output-interval, or as step_size in a spec", "step_size")
     option = f"components.{member.name}.step" if member.step else option
