@@ -58,6 +58,11 @@ _COMMANDS: _Table = {
     "tools": (_TOOLS, "Build FMUs, repair records, validate results, print schemas."),
 }
 
+# Words that people try for what a command, or an option of one, does.
+_WHERE = {"lint": "check", "shrink": "explain RUN --shrink", "map": "explain RUN --map", "plot": "report"}
+_WHERE |= {"falsify": "run", "continue": "resume", "prompt": "llm prompt"}
+_WHERE |= {name: f"tools {name}" for name in _TOOLS}
+
 
 class _LazyGroup(click.Group):
     """Lists commands from a table and imports a command's module only when it is called."""
@@ -82,7 +87,9 @@ class _LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         if args and args[0] not in self._table:
-            ctx.fail(f"No such command {args[0]!r}; {did_you_mean(args[0], self._table)}")
+            where = _WHERE.get(args[0]) if self._table is _COMMANDS else None
+            hint = f"use falsifier {where}" if where else did_you_mean(args[0], self._table)
+            ctx.fail(f"No such command {args[0]!r}; {hint}")
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -41,9 +41,6 @@ class WatchedProgram:
         rights: what the process that watches it is told.
         shared: descriptor of memory that it shares.
         replies: path of a named pipe for its replies, which is made here; None: they come from descriptor 3.
-
-    Attributes:
-        pid: its process id.
     """
 
     def __init__(
@@ -68,7 +65,7 @@ class WatchedProgram:
         self._life: int | None = None
         places = {0: theirs, 1: output, 2: output, 3: answers, 4: shared, 5: end_of_line.fileno()}
         try:
-            self.pid = _spawn(command, environment, places)
+            self.pid = _spawn(command, environment, places)  # its process id
         except BaseException:
             self._close()
             raise

@@ -52,7 +52,7 @@ def read_sealed(path: Path, kind: type[Content], *, what: str) -> Content:
     except ValidationError as error:
         raise JournalError(": ".join((str(path), *first_fault(error)))) from None
     except (ValueError, OSError) as error:
-        campaign = path.parent.parent.parent
+        campaign = path.absolute().parent.parent.parent
         remedy = f"this {what} cannot be continued: start a new one"
         if what == "run" and (campaign / CAMPAIGN).exists():
             remedy = f"to let the campaign repeat this run: falsifier tools repair {shell_word(campaign)}"
@@ -141,9 +141,9 @@ def can_be_a_folder(directory: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno not in _NO_FOLDER:
             raise
-        gone = ", or change to another if the current folder was deleted" * (error.errno == errno.ENOENT)
+        directory.absolute()  # OSError if it is relative and the current folder was deleted
         raise JournalError(
-            f"{directory}: no folder can be made here ({error.strerror}); choose another directory{gone}"
+            f"{directory}: no folder can be made here ({error.strerror}); choose another directory"
         ) from None
 
 

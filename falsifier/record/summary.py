@@ -24,30 +24,19 @@ class Summary:
     """Numbers of one requirement in one run, updated by adding records in order.
 
     They stop at the requirement's counterexample: a shared search continues for the other requirements.
-
-    Attributes:
-        recorded_as: name of the requirement in the journal; None: the run has only one.
-        status: ``waiting`` before the first record; ``running`` until the run has ended.
-        reason: why it ended, in words.
-        best: index of the evaluation with the smallest robustness, or None.
-        verdict: verdict of the counterexample; without one, of the best evaluation.
-        counterexample: index of the confirmed violation, or None.
-        unconfirmed: outcome and reason of violations that were not confirmed, by index.
-        trajectories: file names of kept trajectories, by index.
-        spent: what the run has spent.
-        findings: what the search could not show; empty before it has ended.
     """
 
-    recorded_as: str | None = None
-    status: RunStatus = "waiting"
-    reason: str = ""
-    best: int | None = None
-    verdict: Verdict | None = None
-    counterexample: int | None = None
+    recorded_as: str | None = None  # name of the requirement in the journal; None: the run has only one
+    status: RunStatus = "waiting"  # before the first record; ``running`` until the run has ended
+    reason: str = ""  # why it ended, in words
+    best: int | None = None  # index of the evaluation with the smallest robustness
+    verdict: Verdict | None = None  # of the counterexample; without one, of the best evaluation
+    counterexample: int | None = None  # index of the confirmed violation
+    # Outcome and reason of violations that were not confirmed, and file names of kept trajectories, by index.
     unconfirmed: dict[int, str] = field(default_factory=dict)
     trajectories: dict[int, str] = field(default_factory=dict)
-    spent: Spent = field(default_factory=Spent)
-    findings: tuple[Finding, ...] = ()
+    spent: Spent = field(default_factory=Spent)  # by the run
+    findings: tuple[Finding, ...] = ()  # what the search could not show; empty before it has ended
     _robustness: list[float] = field(default_factory=list)
     _failed: dict[int, str] = field(default_factory=dict)
     _latest: Verdict | None = None

@@ -77,40 +77,24 @@ def _decider(here: Waypoint, buffer: Floats) -> tuple[CompiledPart, int]:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One formula on the path to the deciding predicate.
-
-    Attributes:
-        formula: the formula.
-        time: time in s at which it was evaluated.
-        value: its robustness at that time.
-        window: start and end in s of its operator's window; None if it has no window.
-        text: what happened here, in words; empty within a chain of ``and`` or ``or``.
-    """
+    """One formula on the path to the deciding predicate."""
 
     formula: stl.Formula
-    time: float
-    value: float
-    window: tuple[float, float] | None
-    text: str
+    time: float  # at which it was evaluated, in s
+    value: float  # its robustness at that time
+    window: tuple[float, float] | None  # start and end in s of its operator's window; None without
+    text: str  # what happened here, in words; empty within a chain of ``and`` or ``or``
 
 
 @dataclass(frozen=True, slots=True)
 class VacuousImplication:
-    """An implication whose condition was false at every time at which it was evaluated.
-
-    Attributes:
-        implication: the implication.
-        window: first and last time in s at which it was evaluated.
-        nearest: time in s at which the condition came closest to being true.
-        margin: robustness of the condition at that time.
-        only: whether the implication held only for that reason, because its consequence failed at some time.
-    """
+    """An implication whose condition was false at every time at which it was evaluated."""
 
     implication: stl.Implies
-    window: tuple[float, float]
-    nearest: float
-    margin: float
-    only: bool
+    window: tuple[float, float]  # first and last time in s at which it was evaluated
+    nearest: float  # time in s at which the condition came closest to being true
+    margin: float  # robustness of the condition at that time
+    only: bool  # whether it held only for that reason, because its consequence failed at some time
 
     @property
     def text(self) -> str:

@@ -32,7 +32,7 @@ from falsifier.stl import expression, formula as stl, lexer
 MAX_DEPTH = 100
 # Maximum number of characters of a formula.
 MAX_LENGTH = 20_000
-# Bounds in different units that differ relatively by less are equal but for rounding.
+# Bounds in different units that differ relatively by less, in the wrong order, are equal but for rounding.
 _ROUNDED = 1e-5
 
 _LEVELS: dict[str, int] = {
@@ -244,8 +244,9 @@ class _Parser:
                 f"{end_text}{end_unit or start_unit}]",
             )
         window = stl.Window(_seconds(start_text, start_unit), _seconds(end_text, end_unit))
-        if start_unit != end_unit and math.isclose(window.start, window.end, rel_tol=_ROUNDED):
-            # [1.3333333s,0.0222222min] is one moment; the bound in the smaller unit is the more exact one.
+        # [1.3333333s,0.0222222min] is one moment, the bound in the smaller unit; [1h,3600.01s] may be meant.
+        tolerance = _ROUNDED if window.start > window.end else _ROUNDED**2
+        if start_unit != end_unit and math.isclose(window.start, window.end, rel_tol=tolerance):
             moment = (
                 window.start if lexer.UNITS[start_unit or "s"] < lexer.UNITS[end_unit or "s"] else window.end
             )

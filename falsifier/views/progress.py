@@ -84,24 +84,18 @@ def _show_in_notebook(line: "_Line") -> None:
 
 
 class _Line:
-    """One line on a run that is replaced as it goes on, below the news, or with the latest of them.
-
-    Attributes:
-        title: the requirements and the engine.
-        total: maximum number of simulations; None without a limit.
-        done: number of simulations so far.
-        seconds: time that they took in s; 0 at the end.
-        handle: where it is shown in a notebook.
-    """
+    """One line on a run that is replaced as it goes on, below the news, or with the latest of them."""
 
     def __init__(self, show: Callable[["_Line"], None], keep: Callable[[str], None] | None) -> None:
         self._show, self._keep, self._news = show, keep, News()
         self._begin("", Budget())
 
     def _begin(self, title: str, budget: Budget) -> None:
-        self.title, self.total, self.done = title, budget.simulations, 0
-        self.handle: Any = None
-        self.seconds, self._most, self._note = 0.0, budget.seconds or inf, ""
+        self.title = title  # the requirements and the engine
+        # Maximum number of simulations, None without a limit; number so far; their time in s, 0 at the end.
+        self.total, self.done, self.seconds = budget.simulations, 0, 0.0
+        self.handle: Any = None  # where it is shown in a notebook
+        self._most, self._note = budget.seconds or inf, ""
 
     @property
     def text(self) -> str:

@@ -60,6 +60,8 @@ from tests.command import ROOT, commands, falsifier
         (["run", "AT1", "--engine", "hybrid"], "name one (--llm NAME)"),
         (["run", "AT.fmu", "--stl", "settles signal=x"], "falsifier: --stl: reference: this key is missing"),
         (["simulate", "AT1", "--search", "throttle"], "No such option"),
+        (["shrink", "r"], "use falsifier explain RUN --shrink"),
+        (["schema"], "use falsifier tools schema"),
         (["run", "AT1", "--variant", "MP4"], "add --llm NAME"),
         (["run", "gone.toml"], "no such spec file"),
         (["report", "gone"], "gone: no such directory; expected that of a run or campaign"),

@@ -38,7 +38,7 @@ ACTING = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u202a-\u202e\u20
     ("sent", "shown"),
     [
         ("plain\ttext\nin lines, äöü, ≤ and 😀", "plain\ttext\nin lines, äöü, ≤ and 😀"),
-        ("\x1b[1;31mred\x1b[0m", "red"),
+        ("\x1b[1;31mred\x9b0m", "red"),
         ("\x1b]0;a title\x07shown", "shown"),
         ("\x1b]8;;http://elsewhere\x1b\\a link\x1b]8;;\x1b\\", "a link"),
         ("overwritten\rwritten over\b\b", "overwrittenwritten over"),

@@ -24,18 +24,11 @@ from tests.record.test_summary import confirmed
 from tests.stepped import euler_problem
 
 SPEC = """
-[model]
-fmu = "AT.fmu"
-interface = "co-simulation"
-stop_time = 30
-[inputs.throttle]
-control_points = 2
-[inputs.brake]
-value = 0
-[parameters]
-finalDrive = 3.23
-[requirements.R]
-formula = "G[0,20] (speed <= 120)"
+model = { fmu = "AT.fmu", interface = "co-simulation", stop_time = 30 }
+inputs.throttle.control_points = 2
+inputs.brake.value = 0
+parameters.finalDrive = 3.23
+requirements.R.formula = "G[0,20] (speed <= 120)"
 """
 
 

@@ -15,6 +15,7 @@ from falsifier.errors import ModelError
 from falsifier.fmu import FmuModel, read_info
 from falsifier.fmu.build import compile_sources
 from falsifier.fmu.description.archive import read_entry, this_platform
+from falsifier.fmu.process.start import _libraries
 from tests.fixtures.archives import packed
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ramp, run
@@ -146,16 +147,20 @@ def test_no_compiler_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> Non
 @needs_compiler
 @pytest.mark.skipif(this_platform() != "x86_64-linux", reason="the library of the test is for Linux")
 def test_libraries_beside_that_of_an_fmu_are_found_but_none_that_its_process_needs(tmp_path: Path) -> None:
-    place, stub = "binaries/linux64/", tmp_path / "stub.c"
-    stub.write_text("int unused;")
-    (tmp_path / "libhelper.so").write_bytes(read_entry(fixtures.path("Lag_2"), f"{place}Lag.so"))
-    (tmp_path / "libm.so.6").write_text("no library: whoever loads it fails")
-    linked = [str(stub), "-L.", "-Wl,--no-as-needed", "-l:libhelper.so", "-o", "Lag.so"]
-    compile_c(tmp_path, tmp_path, ["-shared", "-fPIC", *linked])
-    files: dict[str, str | bytes] = {
-        place + name: (tmp_path / name).read_bytes() for name in ("Lag.so", "libhelper.so", "libm.so.6")
-    }
+    place, bad = "binaries/linux64/", ("libm.so.6", "libpthread.so.0")
+    (tmp_path / "stub.c").write_text("int unused;")
+    files: dict[str, str | bytes] = {place + name: "no library: it cannot be loaded" for name in bad}
+    for name in ("libhelper.so", bad[1]):
+        (tmp_path / name).write_bytes(read_entry(fixtures.path("Lag_2"), f"{place}Lag.so"))
+    needed = ["-L.", "-Wl,--no-as-needed", "-l:libhelper.so", f"-l:{bad[1]}", "-o", "Lag.so"]
+    compile_c(tmp_path, tmp_path, ["-shared", "-fPIC", str(tmp_path / "stub.c"), *needed])
+    files |= {place + name: (tmp_path / name).read_bytes() for name in ("Lag.so", "libhelper.so")}
     files["modelDescription.xml"] = read_entry(fixtures.path("Lag_2"), "modelDescription.xml")
     models = FmuModel(packed(tmp_path / "a.fmu", files)), fixtures.isolated("Lag_2")
     found, known = (run(model, ("y",), signals={"u": ramp(1.0)})["y"].tolist() for model in models)
     assert found == known
+    (folder := tmp_path / "0" / place).mkdir(parents=True)
+    for names in (("Lag.so", "liba.so"), ("libb.so",)):  # the second one by an FMU that runs
+        for name in names:
+            (folder / name).touch()
+        assert {file.name for file in _libraries(tmp_path)} == {"Lag.so", "liba.so"}

@@ -178,6 +178,9 @@ def test_a_damaged_run_costs_itself_and_not_its_campaign(
         path.write_bytes(flip(path.read_bytes()[:-3], random) + path.read_bytes()[-3:])
         with pytest.raises(JournalError, match=r"falsifier tools repair \S+/c\b"):
             load_runs(tmp_path / "c")
+        with monkeypatch.context() as there, pytest.raises(JournalError, match="falsifier tools repair"):
+            there.chdir(path.parent)
+            load_runs(".")
         for lock in (campaign_lock(tmp_path / "c"), run_lock(path.parent)):
             with lock:  # what another process writes to stays where it is
                 busy = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path / "c")])

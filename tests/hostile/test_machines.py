@@ -84,7 +84,7 @@ def test_simulations_need_no_streams_and_take_any_tmpdir(shell: str, tmpdir: str
 def test_a_current_folder_that_was_deleted_is_told(tmp_path: Path) -> None:
     (tmp_path / "gone").mkdir()
     code, said = run(tmp_path / "gone", ["run", "AT1"], before=(tmp_path / "gone").rmdir)
-    assert (code, "change to another if the current folder was deleted" in said) == (2, True)
+    assert (code, "if the current folder was deleted, change to another" in said) == (3, True)
 
 
 @pytest.mark.parametrize(

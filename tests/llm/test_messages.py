@@ -15,6 +15,7 @@ def reply_with(text: str) -> ChatReply:
     return ChatReply(text=text, reasoning=text, finish_reason=text)
 
 
-def test_an_ordinary_reply_stays_as_it_is() -> None:
+def test_an_ordinary_reply_stays_as_it_is_without_what_a_terminal_acts_on() -> None:
     plain = reply_with('{"rationale": "sk-learn and pk-values", "signals": []}')
     assert cleaned(plain, ["", "short"]) == plain
+    assert cleaned(reply_with("\x1b]0;title\x07\x1b[31mtext")) == reply_with("text")

@@ -81,6 +81,7 @@ def test_arithmetic(text: str, value: float) -> None:
         ("[1.3333333s,0.0222222min]", stl.Window(1.3333333, 1.3333333)),
         ("[0.0222223min,1.3333333s]", stl.Window(1.3333333, 1.3333333)),
         ("[0.2s,0.00333333333333334min]", stl.Window(0.2, 0.2)),
+        ("[1h,3600.01s]", stl.Window(3600, 3600.01)),
         ("[0,250us]", stl.Window(0, 0.00025)),
         ("[1e1, 2E1]", stl.Window(10, 20)),
     ],

@@ -36,13 +36,9 @@ def evenly(values: list[float], stop_time: float) -> Signal:
 
 @dataclass(frozen=True, slots=True)
 class Driver:
-    """A bundled FMU, driven by inputs that are held over the steps of a grid.
+    """A bundled FMU, driven by inputs that are held over the steps of a grid."""
 
-    Attributes:
-        model: the FMU, simulated by co-simulation.
-    """
-
-    model: FmuModel
+    model: FmuModel  # simulated by co-simulation
 
     def run(
         self,

@@ -80,7 +80,7 @@ def test_of_several_requirements_progress_names_the_one_that_improved(
     assert len(improved) == len(set(improved))
 
 
-def test_if_nothing_gets_better_rate_and_time_left_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_if_nothing_gets_better_it_is_told_how_far_the_search_is(capsys: pytest.CaptureFixture[str]) -> None:
     problem = lag_problem("G[0,10] (x <= 2)")
     evaluation = evaluate(problem, problem.space.decode([0.0] * 4))
     display = progress()

@@ -13,7 +13,8 @@ from falsifier.counterexamples.export.tables import text_of
 from falsifier.counterexamples.store import FILE_NAME
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.fmu import FmuModel
-from falsifier.fmu.description.archive import this_platform
+from falsifier.fmu.description.archive import WINDOWS, this_platform
+from falsifier.fmu.description.libraries import can_run_windows
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
 from falsifier.stl.margins import signed
@@ -93,8 +94,8 @@ def unplayable(model: Model) -> str:
 
 
 def _platforms(model: FmuModel) -> str:
-    """Say where FMPy runs an FMU: unlike falsifier, it does not use Wine."""
-    return f"FMPy runs this FMU on {listed(model.info.platforms)} only, for which it has binaries"
+    """Say where FMPy runs an FMU by itself."""
+    return f"FMPy runs this FMU on {listed(model.info.platforms)}, for which it has binaries"
 
 
 def replay_notes(model: Model) -> Iterator[str]:
@@ -102,7 +103,9 @@ def replay_notes(model: Model) -> Iterator[str]:
     if refusal := unplayable(model):
         yield refusal
     if isinstance(model, FmuModel) and this_platform() not in model.info.platforms:
-        yield f"{_platforms(model)}, and this is {this_platform()}"
+        through_wine = WINDOWS in model.info.platforms and can_run_windows()
+        wine = ", where it needs a program wine64" if through_wine else ""
+        yield f"{_platforms(model)}; this is {this_platform()}{wine}"
 
 
 def _recorded_lines(verdict: Verdict) -> str:

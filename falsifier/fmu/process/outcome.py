@@ -124,13 +124,14 @@ def last_lines(log: tuple[str, ...]) -> str:
 def _other_step(member: Member, step: float, log: tuple[str, ...]) -> str:
     """Say which step to state for an FMU that refuses the one that it was asked for.
 
-    Empty if it says in its messages why it failed, and that is no step; nor does it declare another one.
+    Empty if a message, not of status ok, says why it failed, and that is no step; nor does it declare one.
     """
     option = written("--output-interval, or as step_size in a spec", "step_size")
     option = f"components.{member.name}.step" if member.step else option
     internal = member.description.info.internal_step
     if internal is None or abs(step / internal - max(1, round(step / internal))) < 1e-9:
-        is_explained = any(line.strip() for line in log) and not any("step" in line.lower() for line in log)
+        said = [line.lower() for line in log if line.strip() and not line.startswith("ok:")]
+        is_explained = said and not any("step" in line for line in said)
         return "" if is_explained else f"; an FMU of one step only needs it as {option}"
     return (
         f"; the FMU's internal step is {internal:g} s: state a multiple of it as {option}, and round the "

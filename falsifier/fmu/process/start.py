@@ -2,12 +2,13 @@
 
 import filecmp
 import os
+import re
 import signal
 import subprocess
 import sys
 import sysconfig
 from collections.abc import Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import chain
 from pathlib import Path
 
@@ -36,6 +37,10 @@ _OVERRIDES = "wineboot.exe,services.exe,explorer.exe,winemenubuilder.exe,mscoree
 _WRITTEN_IN_PYTHON = ("*/resources/slavemodule.txt", "*/resources/*/resources/slavemodule.txt")
 # The folders in which the system looks first for the libraries that a library needs.
 _LIBRARY_PATH = "LD_LIBRARY_PATH"
+# The parts of the system's C library, which fit no other version of it.
+_OF_C_LIBRARY = re.compile(
+    r"(ld-.+|lib(c|m|mvec|dl|rt|util|pthread|thread_db|anl|resolv|BrokenLocale|nss_\w+))\.so\.\d+|libnsl\.so\.1"
+)
 # Exceptions of Windows by the signals that the same mistakes have elsewhere.
 _SIGNALS = {
     0xC0000005: signal.SIGSEGV,  # access violation
@@ -127,19 +132,19 @@ class Started:
         self._code: int | None = None
         self.exception: int | None = None  # of Windows, which has ended it, if it has told one
         self.output = Output()  # what it prints
-        environment = worker_environment(os.environ, scratch)
-        if through_wine:
-            _make_prefix(scratch / "prefix")
-            environment = _wine_environment(environment, scratch)
-        else:
-            if any(any(folder.glob(pattern)) for pattern in _WRITTEN_IN_PYTHON):
-                environment = _python_environment(environment)
-            environment = _with_libraries(environment, path, folder, scratch / "libraries")
         # What it is told: where its replies go and where the memory is. Through Wine it gets no descriptors.
         replies, shared = (scratch / "replies", scratch / "memory") if through_wine else (None, None)
         self.connect, self.place = ("" if each is None else windows_path(each) for each in (replies, shared))
         self.memory = Memory(shared)  # what it shares with this process
         try:
+            environment = worker_environment(os.environ, scratch)
+            if through_wine:
+                _make_prefix(scratch / "prefix")
+                environment = _wine_environment(environment, scratch)
+            else:
+                if any(any(folder.glob(pattern)) for pattern in _WRITTEN_IN_PYTHON):
+                    environment = _python_environment(environment)
+                environment = _with_libraries(environment, path, folder, scratch / "libraries")
             memory = int(posix.machine_memory() * _MEMORY_SHARE)
             told = encoded(rights, (scratch, folder), _hidden(), memory=memory, command=command)
             self.program = posix.WatchedProgram(
@@ -182,34 +187,53 @@ def _with_libraries(environment: dict[str, str], program: Path, folder: Path, li
     """Return an environment in which FMUs find the libraries beside their own, as in importers elsewhere.
 
     The process that watches the FMU, which nothing confines, has the same environment. So what the program
-    itself needs is never taken from an FMU; nor is a library of which two FMUs have different ones.
-
-    Args:
-        environment: that of the program.
-        program: what will be started.
-        folder: to which the FMUs were unpacked, each to a folder of its own.
-        links: a new folder for links to the libraries, made if there are any.
+    itself needs is never taken from an FMU. The FMUs were unpacked to ``folder``, each to one of its own; the
+    folder ``links`` is made for links to their libraries, if there are any.
     """
-    here, known = this_platform(), environment.get(_LIBRARY_PATH)
+    libraries, known = _libraries(folder), environment.get(_LIBRARY_PATH)
+    # The system's loader reads such a path as several, or replaces names of its own in it.
+    if not libraries or not {":", ";", "$"}.isdisjoint(str(links)):
+        return environment
+    own = _needed(program, frozenset(item for item in environment.items() if item[0].startswith("LD_")))
+    if not own:
+        return environment
+    links.mkdir()
+    for file in libraries:
+        if file.name not in own:
+            (links / file.name).symlink_to(file)
+    return {**environment, _LIBRARY_PATH: f"{known}:{links}" if known else str(links)}
+
+
+@cache
+def _libraries(folder: Path) -> tuple[Path, ...]:
+    """Return the libraries of FMUs that need more than one, as they were before any of the FMUs ran.
+
+    Not those of which two FMUs have different ones, and no part of the C library.
+    """
+    here = this_platform()
     names = [here, *(old for old, new in OLD_PLATFORMS.items() if new == here)]
     places = [place for name in names for place in folder.glob(f"*/binaries/{name}")]
     found = [[f for f in place.glob("*.so*") if f.is_file() and not f.is_symlink()] for place in places]
     if sys.platform != "linux" or all(len(files) < 2 for files in found):
-        return environment
-    told = {**environment, "LD_TRACE_LOADED_OBJECTS": "1"}
-    traced = subprocess.run([program], env=told, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    own = {Path(line.split()[0]).name for line in traced.stdout.splitlines() if line.strip()}
-    # Where the system's loader tells nothing, such as musl's, it is not known what the program needs.
-    if traced.returncode or not own or not {":", ";"}.isdisjoint(str(links)):
-        return environment
+        return ()
     by_name: dict[str, list[Path]] = {}
     for file in chain.from_iterable(found):
         by_name.setdefault(file.name, []).append(file)
-    links.mkdir()
-    for name, (first, *others) in by_name.items():
-        if name not in own and all(filecmp.cmp(first, other, shallow=False) for other in others):
-            (links / name).symlink_to(first)
-    return {**environment, _LIBRARY_PATH: f"{known}:{links}" if known else str(links)}
+    return tuple(
+        first
+        for name, (first, *others) in by_name.items()
+        if not _OF_C_LIBRARY.fullmatch(name)
+        and all(filecmp.cmp(first, other, shallow=False) for other in others)
+    )
+
+
+@lru_cache
+def _needed(program: Path, environment: frozenset[tuple[str, str]]) -> frozenset[str]:
+    """Return the names of the libraries that a program needs; none where the loader tells none (musl's)."""
+    told = {**dict(environment), "LD_TRACE_LOADED_OBJECTS": "1"}
+    traced = subprocess.run([program], env=told, stdin=subprocess.DEVNULL, capture_output=True)
+    lines = () if traced.returncode else os.fsdecode(traced.stdout).splitlines()
+    return frozenset(Path(line.split()[0]).name for line in lines if line.strip())
 
 
 def _make_prefix(prefix: Path) -> None:

@@ -40,9 +40,6 @@ class Package:
         path: path of the ``.ssp`` or ``.ssd`` file.
         shown: its name in messages.
 
-    Attributes:
-        description: path of the system description.
-
     Raises:
         SpecError: if the file cannot be read, or the archive is rejected.
     """
@@ -58,7 +55,7 @@ class Package:
                 raise SpecError(str(error)) from None
             if not path.is_file():
                 raise SpecError(f"{shown}: the package contains no {_DESCRIPTION}; export the system again")
-        self.description = path
+        self.description = path  # of the system description
 
     def file(self, source: str) -> Path:
         """Return the path of a file; SpecError if it is missing or outside the package."""

@@ -87,11 +87,12 @@ class View:
         What a spec records although it is no output, and what the files say something of, is always told; of
         all other outputs as many as fit.
         """
-        outputs = self.experiment.outputs
-        wanted = (n for n in outputs if self.variable(n).causality != "output" or self.context.of(n))
+        outputs, known = self.experiment.outputs, {v.name: v for v in self.info.variables}
+        described = {n: known.get(n) or Variable(n) for n in outputs}
+        wanted = (n for n, v in described.items() if v.causality != "output" or self.context.of(n))
         asked = {*self.formula_outputs, *wanted}
         others = [n for n in outputs if n not in asked]
-        texts = (f"{n}{self.variable(n).description}".encode() for n in others)
+        texts = (f"{n}{described[n].description}".encode() for n in others)
         sizes = np.cumsum([_BYTES_OF_LINE + len(text) for text in texts])
         asked.update(others[: int(np.searchsorted(sizes, _MOST_OF_OTHERS, side="right"))])
         return tuple(n for n in dict.fromkeys((*self.formula_outputs, *outputs)) if n in asked)

@@ -28,12 +28,14 @@ def test_points_and_values_are_read_at_the_fixed_times() -> None:
     assert as_point(VIEW, STEP)[0].endswith(read)
 
 
+REST = ("v: constant -1", "x0 = 0.25")
+
+
 def test_signals_are_told_with_their_own_control_points() -> None:
     assert as_signals(VIEW, FIXED)[0] == "u: linear, 4 evenly spaced values [0, 0.5, 0.5, 1]"
     assert as_signals(VIEW, STEP) == (
         "u: constant pieces from [time, value] points [[0, 0], [4, 1]]",
-        "v: constant -1",
-        "x0 = 0.25",
+        *REST,
     )
 
 
@@ -43,8 +45,7 @@ def test_in_brief_a_signal_of_many_pieces_is_only_described() -> None:
     made = Candidate({"u": signal, "v": Signal((0.0,), (-1.0,), "pchip")}, {"x0": 0.25})
     assert as_signals(VIEW, made, in_brief=True) == (
         "u: 31 constant pieces between 0 and 1, mean 0.375, each 0.25 to 2.5 s long, 0.25 s in the median",
-        "v: constant -1",
-        "x0 = 0.25",
+        *REST,
     )
     assert as_signals(VIEW, STEP, in_brief=True) == as_signals(VIEW, STEP)
     assert "[[0, 0], [2.5, 1], [2.75, 0]" in as_signals(VIEW, made)[0]
