@@ -174,10 +174,7 @@ def join_formula(
         stop_time = setting("stop_time", "SECONDS")
         raise SpecError(f"{path}: the {info.noun} has no default stop time; add {stop_time}")
     spec = parse_spec(data | {"requirements": {STL_NAME: stated}}, file=str(path))
-    searched = any(s.value is None for s in changes.inputs.values()) or any(
-        s.range is not None for s in changes.parameters.values()
-    )
-    if not searched:
+    if all(section.value is not None for _, section in changes.variables):
         connected = {target for _, target in info.connections}
         bounded = {v.name: InputSection() for v in info.inputs if v.is_bounded and v.name not in connected}
         changes = changes.model_copy(update={"inputs": bounded | changes.inputs})
@@ -324,7 +321,7 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
                 stated["value"] = text if number is None else number
             if variable.causality == "input":
                 inputs[name] = InputSection.model_validate(stated)
-            elif not stated.keys() <= {"range", "value"} or not stated:
+            elif not stated.keys() <= {"range", "value"}:
                 value_kind(variable)
                 raise SpecError(f"is no input: {searching(kind, name)} searches it, without control points")
             else:

@@ -43,9 +43,9 @@ def search_space(
     for name, parameter in parameters.items():
         with _stated("parameters", name, changes.parameters.get(name)):
             variable = _parameter(name, info)
-            if parameter.range is not None:
-                ranges.append(_parameter_range(variable, parameter.range))
-            elif parameter.value is not None and variable.kind != "string":
+            if parameter.value is None:
+                ranges.append(_parameter_range(variable, parameter))
+            elif variable.kind != "string":
                 fixed[name] = _number(variable, parameter.value, "value")
     return SearchSpace(tuple(searched), tuple(ranges), stop_time), fixed
 
@@ -99,14 +99,7 @@ def _variable(name: str, variables: Iterable[Variable], otherwise: str) -> Varia
 
 def _input_range(variable: Variable, section: InputSection) -> InputRange:
     """Return the searched input for a section, completed from the FMU's min, max, unit and description."""
-    low, high = _ends(variable, section.range) if section.range else variable.limits
-    if low is None or high is None:
-        raise SpecError(
-            "the FMU specifies no min and max for this input; add its range: "
-            f"{searching('inputs', variable.name)}, or range = [low, high] in a spec",
-            key="range",
-        )
-    _check(variable, "range", low, high)
+    low, high = _ends(variable, section)
     discrete = variable.kind != "real"
     interpolation = section.interpolation or ("constant" if discrete else "pchip")
     if discrete and interpolation != "constant":
@@ -130,13 +123,12 @@ def _input_range(variable: Variable, section: InputSection) -> InputRange:
     )
 
 
-def _parameter_range(variable: Variable, given: tuple[float | str, float | str]) -> ParameterRange:
-    """Return the searched parameter, completed from the FMU's start value, unit and description."""
-    kind, limits = value_kind(variable), _ends(variable, given)
-    _check(variable, "range", *limits)
+def _parameter_range(variable: Variable, section: ParameterSection) -> ParameterRange:
+    """Return the searched parameter, completed from the FMU's min, max, start value, unit and description."""
+    kind = value_kind(variable)
     return ParameterRange(
         variable.name,
-        *limits,
+        *_ends(variable, section),
         nominal=variable.start_number,
         unit=variable.unit,
         description=variable.description,
@@ -145,25 +137,39 @@ def _parameter_range(variable: Variable, given: tuple[float | str, float | str])
     )
 
 
-def _ends(variable: Variable, given: tuple[float | str, float | str]) -> tuple[float, float]:
-    """Return the ends of a range as numbers; only those of names have not been compared yet."""
-    low, high = (_number(variable, end, "range") for end in given)
-    try:
-        return in_order((low, high))
-    except ValueError as error:
-        raise SpecError(str(error), key="range") from None
+def _ends(variable: Variable, section: InputSection | ParameterSection) -> tuple[float, float]:
+    """Return the ends of the range as numbers, by default the FMU's min and max."""
+    low, high = variable.limits
+    if section.range:
+        low, high = (_number(variable, end, "range") for end in section.range)
+        try:
+            in_order((low, high))  # names have not been compared yet
+        except ValueError as error:
+            raise SpecError(str(error), key="range") from None
+    if low is None or high is None:
+        kind = _kind(variable)
+        raise SpecError(
+            f"the FMU specifies no min and max for this {kind.removesuffix('s')}; add its range: "
+            f"{searching(kind, variable.name)}, or range = [low, high] in a spec",
+            key="range",
+        )
+    _check(variable, "range", low, high)
+    return low, high
 
 
 def _number(variable: Variable, value: float | str, key: str) -> float:
     number = variable.number_of(value) if isinstance(value, str) else value
     if number is None:
-        kind = "inputs" if variable.causality == "input" else "parameters"
-        searched = f"{searching(kind, variable.name)}, or range = [low, high] in a spec"
+        searched = f"{searching(_kind(variable), variable.name)}, or range = [low, high] in a spec"
         advice = f"; to search a range: {searched}" if key == "value" else ""
         raise SpecError(f"expected a number{variable.or_name}, got {value!r}{advice}", key=key)
     if key == "value":
         _check(variable, key, number)
     return number
+
+
+def _kind(variable: Variable) -> str:
+    return "inputs" if variable.causality == "input" else "parameters"
 
 
 def _check(variable: Variable, key: str, *numbers: float) -> None:

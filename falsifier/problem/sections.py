@@ -145,7 +145,10 @@ class InputSection(Section):
 class ParameterSection(Section):
     """One parameter or initial state: searched within a range, or fixed to a value."""
 
-    range: Ends | None = Field(None, description="[low, high] to search within; numbers or names of items.")
+    range: Ends | None = Field(
+        None,
+        description="[low, high] to search within, numbers or names of items; default: FMU's min and max.",
+    )
     value: Value | None = Field(
         None,
         description="Fixed value: a number, the name of an enumeration's item, or the text of a string. A "
@@ -154,8 +157,8 @@ class ParameterSection(Section):
 
     @model_validator(mode="after")
     def _searched_or_fixed(self) -> "ParameterSection":
-        if (self.range is None) == (self.value is None):
-            raise ValueError("expected range = [low, high] (searched) or value = number or text (fixed)")
+        if self.range is not None and self.value is not None:
+            raise ValueError("value fixes the parameter, range searches it; remove one of them")
         return self
 
 

@@ -39,8 +39,9 @@ InputChoice = (
     | InputSection
     | None
 )
-# A value, or text for a string; a range to search; or a complete section of a spec.
-ParameterChoice = Value | tuple[Value, Value] | ParameterSection
+# A value, or text for a string; a range to search; None to search between the FMU's min and max; or a
+# complete section of a spec.
+ParameterChoice = Value | tuple[Value, Value] | ParameterSection | None
 
 Choice = TypeVar("Choice")
 
@@ -119,7 +120,7 @@ def changes_from_options(
             string; a file is named relative to the current folder).
         ranges: ``name=low:high`` (an input is searched with the spec's control points, or else a free
             parameterization), ``name=low:high:points``, ``name=low:high:points:interpolation``, or ``name``
-            (an input is searched as in the spec, or between the FMU's min and max).
+            (searched as in the spec, or between the FMU's min and max).
         more: ``allow``, ``deny`` and fields of ModelChanges; see ``changes_from``.
 
     Raises:
@@ -185,6 +186,8 @@ def _input_section(name: str, choice: InputChoice) -> object:
 
 def _parameter_section(name: str, choice: ParameterChoice) -> object:
     match choice:
+        case None:
+            return {}
         case ParameterSection():
             return choice
         case int() | float():
@@ -193,7 +196,7 @@ def _parameter_section(name: str, choice: ParameterChoice) -> object:
             return {"value": named_file(choice, Path())}
         case (low, high):
             return {"range": (low, high)}
-    expected = "a number, text, (low, high) or a ParameterSection"
+    expected = "a number, text, (low, high), a ParameterSection or None"
     raise SpecError(f"parameters.{name}: expected {expected}, got {shown(choice)}")
 
 

@@ -201,7 +201,7 @@ def overlay(base: Section | None, changes: Section) -> Section:
         if {"control_points", "interpolation"} & stated.keys():
             stated.setdefault("free", None)
     if isinstance(base, sections.ParameterSection):
-        return changes
+        return changes if stated else base.model_copy(update={"value": None})
     return base.model_copy(update=stated)
 
 

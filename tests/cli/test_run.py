@@ -53,7 +53,7 @@ SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
         ),
         ((*SPEED, "--set", "throttle=0:100"), "to search a range: --search throttle=LOW:HIGH"),
         ((*SPEED, "--set", "airLoad=0:1"), "to search a range: --search airLoad=LOW:HIGH"),
-        ((*SPEED, "--search", "speed"), "--search speed=LOW:HIGH"),
+        ((*SPEED, "--search", "speed"), "--search speed: cannot be set: the model computes"),
         ((*SPEED, "--set", "throttle=3", "--search", "throttle"), "drop one of them"),
         (("AT1", "--set", "throtle=3"), "did you mean 'throttle'?"),
         (("my.fmu", "--stl", "G (speed <= 1)", "--parameterization", "fixd"), "only specs have profiles"),

@@ -16,7 +16,7 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import search_space
 from falsifier.problem.requirement import parse_requirement
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
-from falsifier.problem.shorthand import changes_from_options, options_from
+from falsifier.problem.shorthand import changes_from, changes_from_options, options_from
 from falsifier.problem.spec import parse_spec
 from tests.fmu.fixtures import altered, path as fixture
 
@@ -260,8 +260,9 @@ def test_strings_are_no_numbers() -> None:
         with pytest.raises(SpecError, match="this input is a string; it keeps its start value"):
             search_space(section, {}, info, 1.0, ModelChanges())
     named = Variable("text", "string", "parameter", settable=True), Variable("a=b", settable=True)
+    text = placed(changes_from_options(ranges=["text"]), ModelInfo("m", variables=named))
     with pytest.raises(SpecError, match="'text' is a string; only numbers can be searched"):
-        placed(changes_from_options(ranges=["text"]), ModelInfo("m", variables=named))
+        search_space({}, text.parameters, ModelInfo("m", variables=named), 1.0, text)
     with pytest.raises(
         SpecError, match=r"no input, .* 'a'; write \[inputs.NAME\] or .* with 'a=b' in a spec"
     ):
@@ -269,6 +270,18 @@ def test_strings_are_no_numbers() -> None:
     changes = placed(changes_from_options(values=["in=boom"]), info)
     with pytest.raises(SpecError, match=r"^inputs\.in: this input is a string"):
         search_space(changes.inputs, {}, info, 1.0, changes)
+
+
+def test_a_parameter_without_a_range_has_that_of_the_fmu() -> None:
+    mode = Variable("mode", "enumeration", "parameter", literals={"Off": 1, "On": 7}, settable=True)
+    mass = Variable("mass", causality="parameter", low=900.0, high=1100.0, settable=True)
+    info = ModelInfo("m", variables=(mode, mass, Variable("x", settable=True)))
+    changes = placed(changes_from_options(ranges=["mode", "mass"]), info)
+    assert changes == placed(changes_from(parameters={"mode": None, "mass": None}), info)
+    space, _ = search_space({}, changes.parameters, info, 1.0, changes)
+    assert [(r.low, r.high) for r in space.parameters] == [(1, 7), (900, 1100)]
+    with pytest.raises(SpecError, match="specifies no min and max for this parameter; add its range"):
+        search_space({}, {"x": ParameterSection()}, info, 1.0, ModelChanges())
 
 
 def test_a_string_keeps_the_text_that_was_typed_and_a_number_may_be_typed_in_any_form() -> None:

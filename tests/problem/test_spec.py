@@ -45,7 +45,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("inputs.u.value", 1.0, r"inputs\.u: value keeps the input constant"),
         ("inputs.u.free", {"max_control_points": 3}, r"inputs\.u\.free\.min_interval: this key is missing"),
         ("model.interface", "cs", r"model\.interface: .*'co-simulation' or 'model-exchange', got 'cs'$"),
-        ("parameters.p", {"range": [0, 1], "value": 2}, r"parameters\.p: expected range"),
+        ("parameters.p", {"range": [0, 1], "value": 2}, r"parameters\.p: value fixes the parameter"),
         ("requirements", {}, r"requirements: "),
         ("requirements.R", {"tempalte": "x"}, r"requirements\.R\.tempalte: .* did you mean 'template'"),
         ("connections", {"a.b": {"source": "c.d"}}, r"connections\.a\.b\.source: unknown key; known: from,"),
@@ -119,7 +119,9 @@ def test_fixed_and_searched_replace_each_other() -> None:
     fixed = InputSection(value=0.5)
     assert overlay(searched, fixed) == fixed
     assert overlay(fixed, searched).value is None
-    assert overlay(ParameterSection(value=2.0), ParameterSection(range=(0, 1))).value is None
+    narrow = ParameterSection(range=(0, 1))
+    assert overlay(ParameterSection(value=2.0), narrow) == overlay(narrow, ParameterSection()) == narrow
+    assert overlay(ParameterSection(value=2.0), ParameterSection()) == ParameterSection(value=None)
 
 
 @pytest.mark.parametrize(
