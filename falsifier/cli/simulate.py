@@ -14,7 +14,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_text, number_in, one_line
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, SearchSpace
+from falsifier.core.space import InputRange, ParameterRange, SearchSpace
 from falsifier.counterexamples.case import recorded_inputs
 from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import Evaluation, simulate as simulate_inputs
@@ -61,9 +61,9 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
             if excess := problem.info[name].excess(low, high):
                 warn(f"{name}: {f'{low:.12g}' if low == high else f'[{low:.12g}, {high:.12g}]'} {excess}")
         known = {*signals, *stored.parameters, *given}
-        if signals and (kept := [n for n in problem.space.names if n not in known]):
+        if known and (kept := [n for n in problem.space.names if n not in known]):
             warn(f"no values given for {', '.join(kept)}: kept at the model's start value")
-        if inputs and not signals:
+        if inputs and not known:
             warn(
                 f"{problem.name}: no inputs given: all keep the problem's fixed values or the model's start "
                 "values; --inputs u.csv or --set NAME=VALUE gives some"
@@ -123,12 +123,13 @@ def _read(file: Path, problem: Problem) -> dict[str, Signal]:
 
 
 def _with_own_ranges(problem: Problem, candidate: Candidate) -> Problem:
-    """Return the problem with the given inputs instead of the searched ones, for text and picture.
+    """Return the problem with the given inputs and parameters instead of the searched, for text and picture.
 
     Ranges are those of the search or else of the model, as far as they are known, and hold all values.
     """
     searched = {r.name: r for r in problem.space.inputs}
-    inputs = []
+    kind: Any  # no string: it was simulated
+    inputs, parameters = [], []
     for name, signal in candidate.signals.items():
         own, variable = searched.get(name), problem.info[name]
         limits = variable.limits if own is None else (own.low, own.high)
@@ -136,10 +137,16 @@ def _with_own_ranges(problem: Problem, candidate: Candidate) -> Problem:
         room = 1.0 if min(values) == max(values) else 0.0
         low, high = min(values) - room, max(values) + room
         if own is None:
-            kind: Any = variable.kind  # no string: it was simulated
+            kind = variable.kind
             own = InputRange(name, low, high, unit=variable.unit, kind=kind, items=variable.items)
         inputs.append(replace(own, low=low, high=high))
-    return replace(problem, space=SearchSpace(tuple(inputs), (), problem.space.stop_time))
+    for name, value in candidate.parameters.items():
+        variable = problem.info[name]
+        kind = variable.kind
+        parameters.append(
+            ParameterRange(name, value, value, unit=variable.unit, kind=kind, items=variable.items)
+        )
+    return replace(problem, space=SearchSpace(tuple(inputs), tuple(parameters), problem.space.stop_time))
 
 
 def _written(problem: Problem, drawn: Problem, evaluation: Evaluation, out: Path) -> list[Path]:

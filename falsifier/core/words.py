@@ -6,7 +6,7 @@ from typing import Literal
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, SearchSpace
+from falsifier.core.space import InputRange, SearchSpace, number_names
 
 # Maximum number of control points shown; longer signals are abbreviated in the middle.
 _SHOWN_POINTS = 12
@@ -42,13 +42,18 @@ def readable(value: float, digits: int = 6, sign: Literal["", "+"] = "") -> str:
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
     """Return what a candidate chooses, inputs first: ``input`` or ``parameter``, and the choice in words.
 
-    Units are told if the search space is given, which has them.
+    Units, and the names of parameters' numbers, are told if the search space is given, which has them.
     """
     labels = {r.name: with_unit(r.name, r.unit) for r in space.ranges} if space is not None else {}
+    names = {r.name: number_names(r.kind, r.items) for r in space.parameters} if space is not None else {}
+    chosen = {n: (v, names.get(n, {}).get(int(v))) for n, v in candidate.parameters.items()}
     signals = {n: s.stepped(inf if space is None else space.stop_time) for n, s in candidate.signals.items()}
     return [
         *(("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in signals.items()),
-        *(("parameter", f"{labels.get(n, n)} = {v:.10g}") for n, v in candidate.parameters.items()),
+        *(
+            ("parameter", f"{labels.get(n, n)} = {v:.10g}{f' ({name})' if name else ''}")
+            for n, (v, name) in chosen.items()
+        ),
     ]
 
 

@@ -66,6 +66,8 @@ def test_a_searched_input_that_is_not_given_is_told(tmp_path: Path) -> None:
         requirements.R.formula = 'G (speed <= 200)'""")
     done = falsifier("simulate", "car.toml:R", "--inputs", "u.csv", cwd=tmp_path)
     assert "no values given for finalDrive: kept at the model's start value" in done.err
+    done = falsifier("simulate", "car.toml:R", "--set", "finalDrive=3.2", cwd=tmp_path)
+    assert "no values given for throttle" in done.err and "no inputs given" not in done.err
 
 
 def test_a_problem_in_which_everything_is_fixed_is_simulated_but_not_searched(tmp_path: Path) -> None:

@@ -69,6 +69,8 @@ def test_inputs_come_first_with_the_units_of_the_space() -> None:
         ("input", f"u [V] {told}"),
         ("parameter", "mass [kg] = 0.3333333333"),
     ]
+    modes = SearchSpace((), (ParameterRange("mode", 1, 7, kind="enumeration", items=(("Eco", 7),)),), 10.0)
+    assert candidate_facts(Candidate(parameters={"mode": 7.0}), modes) == [("parameter", "mode = 7 (Eco)")]
     assert in_one_line(CANDIDATE) == f"u {told}; mass = 0.3333333333", "without a space no unit is known"
     assert in_one_line(Candidate()) == ""
 
