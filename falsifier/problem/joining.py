@@ -238,6 +238,14 @@ def _notes(grid: Grid | None, model: Model, space: SearchSpace, experiment: Expe
     for r in space.inputs:
         if r.hold is not None and r.hold < (step := experiment.step):
             yield f"{r.name}: hold = {readable(r.hold)} s is shorter than the communication step, {step:g} s"
+    for p in space.ranges:
+        variable = model.info[p.name]
+        start, shown = variable.start_number, variable.display_unit
+        if p.unit and shown not in ("", p.unit) and start is not None and not p.low <= start <= p.high:
+            yield (
+                f"{p.name}: its start value, {readable(start)} {p.unit}, is outside the range; all numbers "
+                f"are in {p.unit}, not in {shown}, in which the FMU wants it displayed"
+            )
     yield from rights_notes(model)
 
 

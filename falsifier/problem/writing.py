@@ -13,7 +13,7 @@ from tomlkit.items import InlineTable, Item
 
 from falsifier.core.arguments import utf_8
 from falsifier.core.files import absent
-from falsifier.core.literals import one_line, toml_key
+from falsifier.core.literals import one_line, shortest, toml_key
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import in_unit
 from falsifier.errors import FormulaError, SpecError
@@ -32,7 +32,7 @@ from falsifier.stl.lexer import name_text
 
 # Stop time in s if the FMU specifies none.
 DEFAULT_STOP_TIME = 10.0
-# Maximum number of parameters, and of variables to write requirements about, that are listed.
+# Maximum number of parameters, of initial states, and of variables to write requirements about, listed.
 _SHOWN_PARAMETERS = 10
 _SHOWN_VARIABLES = 20
 # Name of the requirement in a starter spec, which is to be replaced.
@@ -53,9 +53,9 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
     """
     inputs = [v for v in info.inputs if v.kind != "string"]
     settable = [v for v in info.variables if v.settable and v.kind != "string" and v.causality != "input"]
-    # Parameters, or else start values; real ones first.
-    tunable = [v for v in settable if v.causality == "parameter"] or settable
-    tunable.sort(key=lambda v: v.kind != "real")
+    # Parameters and initial states, or else all start values; real ones first.
+    tunable = [v for v in settable if v.causality == "parameter" or v.is_state] or settable
+    tunable.sort(key=lambda v: (v.causality != "parameter", v.kind != "real"))
     if not inputs and not tunable:
         raise SpecError(
             f"{info.name}: nothing to search: the {info.noun} has no input, parameter or start value to set"
@@ -136,11 +136,16 @@ def _parameters(tunable: Sequence[Variable], *, searched: Sequence[Variable]) ->
     others = [v for v in tunable if v not in searched]
     if others:
         lines.append("# Each may be searched, or fixed with NAME = NUMBER:")
-    for v in others[:_SHOWN_PARAMETERS]:
+    listed = others[:_SHOWN_PARAMETERS]
+    listed += [v for v in others if v.is_state and v not in listed][:_SHOWN_PARAMETERS]
+    for v in listed:
         low, high = v.limits
         shown = "[LOW, HIGH]" if low is None or high is None else _range(v, low, high)
-        default = "not stated" if v.start is None else in_unit(f"{v.start}", v.unit)
-        lines.append(_comment(f"{toml_key(v.name)}.range = {shown}  # default: {default}"))
+        default = "not stated" if v.start_number is None else in_unit(shortest(v.start_number), v.unit)
+        items = f" ({v.items_text})" if v.items_text else ""
+        lines.append(_comment(f"{toml_key(v.name)}.range = {shown}  # default: {default}{items}"))
+    if len(others) > len(listed):
+        lines.append(_comment(f"... and {len(others) - len(listed)} more, which falsifier info lists"))
     return "\n".join(lines)
 
 

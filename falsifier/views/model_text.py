@@ -70,7 +70,9 @@ def _cells(v: Variable) -> tuple[str, ...]:
     low, high = _number(v.low), _number(v.high)
     if v.causality == "input" and v.kind == "real":
         low, high = low or "unbounded", high or "unbounded"
-    said = (v.items_text, "" if v.nominal is None else f"nominally {readable(v.nominal)}")
+    is_asked = v.refusal and (v.causality == "parameter" or v.is_state)
+    refusal = f"cannot be set: {v.refusal}" if is_asked else ""
+    said = (refusal, v.items_text, "" if v.nominal is None else f"nominally {readable(v.nominal)}")
     description = " ".join([*v.description.split(), *(f"({text})" for text in said if text)])
     return (v.name, v.kind, unit, low, high, _number(v.start), description)
 

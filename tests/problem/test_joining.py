@@ -153,6 +153,18 @@ def test_a_hold_that_is_shorter_than_a_step_is_noted() -> None:
     assert note == "throttle: hold = 0.005 s is shorter than the communication step, 0.01 s"
 
 
+def test_a_range_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> None:
+    old, new = b'unit="m" start="1.0"', b'unit="m" displayUnit="mm" start="1.0"'
+    ball = altered(fixture("Ball_2"), tmp_path / "ball.fmu", lambda text: text.replace(old, new))
+    for high, told in (
+        (1, []),
+        (0.5, ["h: its start value, 1 m, is outside the range; all numbers are in m"]),
+    ):
+        changes = changes_from(parameters={"h": (0, high)})
+        found = join_formula(ball, RequirementSection(formula="G (h <= 9)"), changes=changes).notes
+        assert [n.partition(", not")[0] for n in found if "outside" in n] == told
+
+
 def test_inputs_that_need_only_be_named_are_told() -> None:
     spec = {key: SPEC[key] for key in ("model", "requirements")}
     with pytest.raises(SpecError, match="throttle and brake would be searched between min and max if"):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.fmu import read_info
 from falsifier.problem.loading import load_problem
@@ -75,7 +76,18 @@ def test_names_and_texts_with_any_characters_give_valid_toml(tmp_path: Path) -> 
     # Parameters are offered in comments; what these say is valid, too.
     offered = [line.removeprefix("# ") for line in spec.read_text("utf-8").splitlines() if "LOW" in line]
     keys = [next(iter(tomllib.loads(line.replace("[LOW, HIGH]", "[1, 2]")))) for line in offered]
-    assert keys == ["'T of # plant'", "Verstärkung"]
+    assert keys == ["'T of # plant'", "Verstärkung", "plant\\x"], "parameters, and then initial states"
+
+
+def test_parameters_beyond_the_first_ten_are_counted() -> None:
+    items = {"off": 1, "on": 2}
+    mode = Variable("mode", "enumeration", "parameter", start=2.0, settable=True, literals=items)
+    many = tuple(replace(mode, name=f"p{k}", kind="integer", literals={}) for k in range(12))
+    ends = Variable("u", causality="input"), Variable("y", causality="output")
+    text = starter_spec(Path("m.fmu"), ModelInfo("m", variables=(mode, *many, *ends)))
+    assert "# mode.range = [1, 2]  # default: 2 (1 = off, 2 = on)\n" in text
+    assert "# p0.range = [LOW, HIGH]  # default: 2\n" in text
+    assert "# ... and 3 more, which falsifier info lists\n" in text
 
 
 def test_without_outputs_states_are_offered(tmp_path: Path) -> None:

@@ -19,3 +19,5 @@ def test_unbounded_inputs_and_nominal_values_are_told() -> None:
     (row,) = [line for line in lines if line.startswith("u ")]
     assert row.split() == ["u", "real", "m", "unbounded", "unbounded", "0"]
     assert "(nominally 5)" in info_text(read_info(path("Lag_2")))
+    computed = Variable("x", is_state=True, refusal="the model computes its initial value")
+    assert "(cannot be set: the model computes" in info_text(ModelInfo("m", variables=(computed,)))
