@@ -22,6 +22,7 @@ from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.joining import rights_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
+from falsifier.problem.ranges import value_kind
 from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
 from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines
@@ -128,8 +129,7 @@ def _with_own_ranges(problem: Problem, candidate: Candidate) -> Problem:
     Ranges are those of the search or else of the model, as far as they are known, and hold all values.
     """
     searched = {r.name: r for r in problem.space.inputs}
-    kind: Any  # no string: it was simulated
-    inputs, parameters = [], []
+    inputs = []
     for name, signal in candidate.signals.items():
         own, variable = searched.get(name), problem.info[name]
         limits = variable.limits if own is None else (own.low, own.high)
@@ -137,16 +137,14 @@ def _with_own_ranges(problem: Problem, candidate: Candidate) -> Problem:
         room = 1.0 if min(values) == max(values) else 0.0
         low, high = min(values) - room, max(values) + room
         if own is None:
-            kind = variable.kind
+            kind = value_kind(variable)
             own = InputRange(name, low, high, unit=variable.unit, kind=kind, items=variable.items)
         inputs.append(replace(own, low=low, high=high))
-    for name, value in candidate.parameters.items():
-        variable = problem.info[name]
-        kind = variable.kind
-        parameters.append(
-            ParameterRange(name, value, value, unit=variable.unit, kind=kind, items=variable.items)
-        )
-    return replace(problem, space=SearchSpace(tuple(inputs), tuple(parameters), problem.space.stop_time))
+    chosen = ((problem.info[name], value) for name, value in candidate.parameters.items())
+    parameters = tuple(
+        ParameterRange(v.name, x, x, unit=v.unit, kind=value_kind(v), items=v.items) for v, x in chosen
+    )
+    return replace(problem, space=SearchSpace(tuple(inputs), parameters, problem.space.stop_time))
 
 
 def _written(problem: Problem, drawn: Problem, evaluation: Evaluation, out: Path) -> list[Path]:

@@ -23,6 +23,8 @@ KEYS_WITH_OPTION = ("interface", "stop_time", "output_interval", "time_limit", "
 _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
 # A template and its first argument; no formula begins like this.
 _TEMPLATE = re.compile(r"\s*([a-z_]+)\s+\w+\s*=(?!=)")
+# What may follow the ends of an input's range.
+_OF_INPUTS = ("control_points", "interpolation")
 # One argument of a template: spaces only in quotes and in lists.
 _ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
 
@@ -64,17 +66,16 @@ def changes_from(
         SpecError: naming the input, parameter or field that is invalid.
     """
     inputs, parameters = inputs or {}, parameters or {}
+    data: dict[str, Any] = {name: value for name, value in experiment.items() if value is not None}
     instance("inputs", inputs, Mapping, "choices by name, such as {'u': (0, 1)}")
     instance("parameters", parameters, Mapping, "choices by name, such as {'p': 1.5}")
     for what, choices in (("inputs", inputs), ("parameters", parameters)):
         if wrong := [n for n in choices if not isinstance(n, str)]:
             raise SpecError(f"{what}: names must be text, got the key {wrong[0]!r}")
-    data: dict[str, Any] = {name: value for name, value in experiment.items() if value is not None}
+        data[what] = {name: _section(what, name, _from_numpy(c)) for name, c in choices.items()}
     if both := sorted(inputs.keys() & parameters.keys()):
         why = written("--set keeps it constant, --search varies it", "given in inputs and in parameters")
         raise SpecError(f"{both[0]}: {why}; drop one of them")
-    data["inputs"] = {name: _input_section(name, _from_numpy(c)) for name, c in inputs.items()}
-    data["parameters"] = {name: _parameter_section(name, _from_numpy(c)) for name, c in parameters.items()}
     listed = {"omit": texts("omit", omit), **given_rights(allow, deny)}
     data |= {name: words for name, words in listed.items() if words}
     try:
@@ -170,34 +171,21 @@ def _said(value: float | str) -> str:
     return value if isinstance(value, str) else shortest(value)
 
 
-def _input_section(name: str, choice: InputChoice) -> object:
+def _section(kind: str, name: str, choice: InputChoice | ParameterChoice) -> object:
+    """Return the section that a choice for an input or a parameter stands for, or its keys."""
+    own, keys = (ParameterSection, ()) if kind == "parameters" else (InputSection, _OF_INPUTS)
     match choice:
         case None:
             return {}
-        case InputSection():
+        case InputSection() | ParameterSection() if isinstance(choice, own):
             return choice
         case int() | float() | str():
-            return {"value": choice}
-        case (low, high, *more) if len(more) <= 2:
-            return {"range": (low, high)} | dict(zip(("control_points", "interpolation"), more, strict=False))
-    expected = "a number, (low, high[, points[, interpolation]]), an InputSection or None"
-    raise SpecError(f"inputs.{name}: expected {expected}, got {shown(choice)}")
-
-
-def _parameter_section(name: str, choice: ParameterChoice) -> object:
-    match choice:
-        case None:
-            return {}
-        case ParameterSection():
-            return choice
-        case int() | float():
-            return {"value": choice}
-        case str():
-            return {"value": named_file(choice, Path())}
-        case (low, high):
-            return {"range": (low, high)}
-    expected = "a number, text, (low, high), a ParameterSection or None"
-    raise SpecError(f"parameters.{name}: expected {expected}, got {shown(choice)}")
+            is_file = kind == "parameters" and isinstance(choice, str)
+            return {"value": named_file(str(choice), Path()) if is_file else choice}
+        case (low, high, *more) if len(more) <= len(keys):
+            return {"range": (low, high)} | dict(zip(keys, more, strict=False))
+    said = "a number, (low, high[, points[, interpolation]])" if keys else "a number, text, (low, high)"
+    raise SpecError(f"{kind}.{name}: expected {said}, {own.__name__} or None, got {shown(choice)}")
 
 
 def _from_numpy(choice: Any) -> Any:

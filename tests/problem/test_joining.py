@@ -156,10 +156,8 @@ def test_a_hold_that_is_shorter_than_a_step_is_noted() -> None:
 def test_a_range_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> None:
     old, new = b'unit="m" start="1.0"', b'unit="m" displayUnit="mm" start="1.0"'
     ball = altered(fixture("Ball_2"), tmp_path / "ball.fmu", lambda text: text.replace(old, new))
-    for high, told in (
-        (1, []),
-        (0.5, ["h: its start value, 1 m, is outside the range; all numbers are in m"]),
-    ):
+    note = "h: its start value, 1 m, is outside the range; all numbers are in m"
+    for high, told in ((1, []), (0.5, [note])):
         changes = changes_from(parameters={"h": (0, high)})
         found = join_formula(ball, RequirementSection(formula="G (h <= 9)"), changes=changes).notes
         assert [n.partition(", not")[0] for n in found if "outside" in n] == told

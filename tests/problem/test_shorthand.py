@@ -89,9 +89,9 @@ def test_a_name_is_given_once(options: dict[str, Any], message: str, at_the_comm
     [
         ({"inputs": {1: (0, 1)}}, "^inputs: names must be text, got the key 1"),
         ({"parameters": {1: 2}}, "^parameters: names must be text, got the key 1"),
-        ({"inputs": {"u": {"range": (0, 1)}}}, r"an InputSection or None, got \{'range': \(0, 1\)\}"),
+        ({"inputs": {"u": {"range": (0, 1)}}}, r"InputSection or None, got \{'range': \(0, 1\)\}"),
         ({"inputs": {"u": {0, 100}}}, "inputs.u: .*got "),
-        ({"parameters": {"p": (1,)}}, r"parameters.p: .*a ParameterSection or None, got \(1,\)"),
+        ({"parameters": {"p": (1,)}}, r"parameters.p: .*ParameterSection or None, got \(1,\)"),
         ({"inputs": {"u": (0, [1])}}, r"inputs.u.range, entry 2: expected a number or text, got \[1\]"),
         ({"parameters": {"p": 10**400}}, "parameters.p.value: expected a finite number, got 10"),
     ],
