@@ -98,11 +98,6 @@ def test_what_is_told_of_an_fmu_is_said_by_its_folders() -> None:
     assert "documentation, sources and texts" in said and "annotations" not in said
 
 
-def test_a_bare_number_fixes_a_parameter() -> None:
-    spec = parse_spec(changed("parameters.mass", 3), file="my.toml")
-    assert spec.parameters["mass"].value == 3
-
-
 def test_a_narrowed_range_keeps_the_parameterization_and_another_one_is_fixed() -> None:
     base = InputSection.model_validate(
         {"range": [0, 1], "control_points": 3, "free": {"max_control_points": 9, "min_interval": 0.1}}
@@ -122,6 +117,8 @@ def test_fixed_and_searched_replace_each_other() -> None:
     narrow = ParameterSection(range=(0, 1))
     assert overlay(ParameterSection(value=2.0), narrow) == overlay(narrow, ParameterSection()) == narrow
     assert overlay(ParameterSection(value=2.0), ParameterSection()) == ParameterSection(value=None)
+    bare = parse_spec(changed("parameters.mass", 3), file="my.toml")
+    assert bare.parameters["mass"] == ParameterSection(value=3)
 
 
 @pytest.mark.parametrize(

@@ -129,18 +129,13 @@ LAUGHS = b"""<!DOCTYPE x [<!ENTITY a "ha"><!ENTITY b "&a;&a;">]><x>&b;</x>"""
 OUTSIDE = b"""<!DOCTYPE x SYSTEM "file:///etc/passwd"><x/>"""
 
 
-@pytest.mark.parametrize("text", [LAUGHS, OUTSIDE, OUTSIDE.decode().encode("utf-16")])
-def test_document_types_are_refused(text: bytes) -> None:
-    with pytest.raises(SpecError, match=r"part: refused because it declares a document type \(x\)"):
-        read_xml(text, "part", SpecError)
-
-
-@pytest.mark.parametrize(
-    "text", [b"<a><b></a>", b"", b"<?xml version='1.0' encoding='no'?><a/>", b"<a>&x;</a>"]
-)
-def test_what_is_not_well_formed_is_named(text: bytes) -> None:
-    with pytest.raises(SpecError, match="part: not well-formed XML"):
-        read_xml(text, "part", SpecError)
+def test_document_types_are_refused_and_what_is_not_well_formed_is_named() -> None:
+    for text in (LAUGHS, OUTSIDE, OUTSIDE.decode().encode("utf-16")):
+        with pytest.raises(SpecError, match=r"part: refused because it declares a document type \(x\)"):
+            read_xml(text, "part", SpecError)
+    for text in (b"<a><b></a>", b"", b"<?xml version='1.0' encoding='no'?><a/>", b"<a>&x;</a>"):
+        with pytest.raises(SpecError, match="part: not well-formed XML"):
+            read_xml(text, "part", SpecError)
 
 
 def test_depth_and_size_have_limits(monkeypatch: pytest.MonkeyPatch) -> None:
