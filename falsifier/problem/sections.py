@@ -146,8 +146,7 @@ class ParameterSection(Section):
     """One parameter or initial state: searched within a range, or fixed to a value."""
 
     range: Ends | None = Field(
-        None,
-        description="[low, high] to search within, numbers or names of items; default: FMU's min and max.",
+        None, description="[low, high], numbers or names of items, to search; default: FMU's min and max."
     )
     value: Value | None = Field(
         None,
