@@ -13,7 +13,7 @@ from falsifier.core.arguments import utf_8
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
 from falsifier.core.strict import Strict
-from falsifier.errors import did_you_mean, shown
+from falsifier.errors import did_you_mean, shown, written
 from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method
 
 
@@ -61,7 +61,11 @@ _ControlPoints = Annotated[int, Field(ge=1, le=MAX_CONTROL_POINTS), BeforeValida
 def in_order(limits: tuple[float, float]) -> tuple[float, float]:
     """Return the ends of a range; ValueError if the first one is not the smaller one."""
     if not limits[0] < limits[1]:
-        raise ValueError(f"expected [low, high] with low < high, got [{limits[0]:.12g}, {limits[1]:.12g}]")
+        constant = written("; --set NAME=VALUE keeps it constant", "; one number alone keeps it constant")
+        raise ValueError(
+            f"expected [low, high] with low < high, got [{limits[0]:.12g}, {limits[1]:.12g}]"
+            f"{constant if limits[0] == limits[1] else ''}"
+        )
     return limits
 
 

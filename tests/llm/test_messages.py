@@ -1,5 +1,7 @@
 """What travels, and what of it may be recorded and shown."""
 
+import pytest
+
 from falsifier.llm.messages import ChatReply, Exchange, Message, cleaned
 
 
@@ -13,6 +15,13 @@ def test_exchanges_come_back_whole_and_an_empty_field_of_few_messages_is_not_wri
 
 def reply_with(text: str) -> ChatReply:
     return ChatReply(text=text, reasoning=text, finish_reason=text)
+
+
+def test_secrets_are_removed_from_every_part(monkeypatch: pytest.MonkeyPatch) -> None:
+    key = "an-ordinary-looking-key"
+    assert cleaned(reply_with(f"your key is {key}"), [key]) == reply_with("your key is [redacted]")
+    monkeypatch.setenv("MISTRAL_API_KEY", key)
+    assert cleaned(reply_with(f"({key})")) == reply_with("([redacted])")
 
 
 def test_an_ordinary_reply_stays_as_it_is_without_what_a_terminal_acts_on() -> None:

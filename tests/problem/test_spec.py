@@ -34,6 +34,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("model.stoptime", 3, r"model\.stoptime: unknown key; did you mean 'stop_time'\?"),
         ("requirement", {}, r"requirement: unknown key; did you mean 'requirements'\?"),
         ("inputs.u.range", [1, 0], r"inputs\.u\.range: expected \[low, high\] with low < high, got \[1, 0\]"),
+        ("parameters.p.range", [3, 3], r".* got \[3, 3\]; one number alone keeps it constant$"),
         ("inputs.u.range", [0], r"inputs\.u\.range, entry 2: a value is missing"),
         ("inputs.u.interpolation", "cubic", r"inputs\.u\.interpolation: .*'constant', got 'cubic'$"),
         ("inputs.u.control_points", True, r"inputs\.u\.control_points: expected a number, got true$"),
