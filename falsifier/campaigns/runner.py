@@ -229,5 +229,7 @@ def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
     with open_journal(directory, keep=task.request.keep, patience=PATIENCE) as journal:
         if not holds_run(directory):
             method = method_of(task.request).label
-            manifest.write(directory, manifest.describe(task.request, [task.problem], method, task.hashes))
+            manifest.write(
+                directory, manifest.describe(task.request, [task.problem], method, hashes=task.hashes)
+            )
         journal.write(EndedRecord(status="failed", reason=reason, spent=summary.spent))

@@ -34,6 +34,12 @@ _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
 _EXACT = 2**53 - 1
 
 
+# Maximum number of internal states, and of internal modes, that searches record; beginnings of the names that
+# tools give to what they add.
+_MOST_INTERNALS = 12
+_OF_TOOLS = ("$", "_")
+
+
 @dataclass(frozen=True, slots=True)
 class Variable:
     """One scalar variable of a model; each element of an array is a separate variable (``x[1]``).
@@ -249,6 +255,17 @@ class ModelInfo:
         return self.outputs or states or tuple(computed)
 
     @property
+    def internals(self) -> tuple[Variable, ...]:
+        """Internal variables that tell what outputs may hide: its first states and modes.
+
+        Modes are integers, Booleans and enumerations that change at events; none of these becomes NaN alone.
+        """
+        known = [v for v in self.with_causality("local") if not v.name.startswith(_OF_TOOLS)]
+        states = [v for v in known if v.is_state]
+        modes = [v for v in known if v.variability == "discrete" and v.kind not in ("real", "string")]
+        return (*states[:_MOST_INTERNALS], *modes[:_MOST_INTERNALS])
+
+    @property
     def parameters(self) -> tuple[Variable, ...]:
         """Parameters in the model's order; of several names for one parameter, the first."""
         return tuple(v for v in self.with_causality("parameter") if not v.alias_of)
@@ -305,6 +322,7 @@ class Experiment:
         time_limit: maximum wall-clock time of one simulation in s; None: as long as it makes progress, see
             ``falsifier.fmu.process.plan``.
         strings: names and values of string parameters.
+        internals: internal variables that searches record, too, as engines learn from them.
 
     Raises:
         SpecError: naming the attribute that is not as above.
@@ -317,6 +335,9 @@ class Experiment:
     tolerance: float | None = None
     time_limit: float | None = None
     strings: tuple[tuple[str, str], ...] = ()
+    internals: tuple[str, ...] = field(
+        default=(), repr=False
+    )  # no part of fingerprints: results are the same
 
     def __post_init__(self) -> None:
         for name in ("stop_time", "output_interval"):

@@ -189,7 +189,8 @@ def preview(
         doubtful: violations among the evaluations that do not count.
         lessons: what the LLM wrote down in its last reply.
     """
-    briefing = Briefing(problem, variant=variant, anonymous=anonymous)
+    told = problem.watching(problem.experiment.internals, only_modes=True)
+    briefing = Briefing(told, variant=variant, anonymous=anonymous)
     briefing.simulations = simulations
     briefing.lessons = briefing.reason(lessons)  # those of a run with real names have these
     doubts = {c.candidate.key: c for c in doubtful}

@@ -216,6 +216,22 @@ def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
     return {name: (min(at[name] for at in found), max(at[name] for at in found)) for name in names}
 
 
+def readable_internals(problem: Problem) -> tuple[str, ...]:
+    """Return the internal variables to record in a search; none if the model cannot be asked for them.
+
+    To see that, the model is initialised in the middle of the search space, and steps as above.
+    """
+    space, experiment = problem.space, problem.experiment
+    names = tuple(name for name in experiment.internals if name not in experiment.outputs)
+    brief = replace(experiment, stop_time=_shortest(problem), outputs=(*experiment.outputs, *names))
+    with suppress(CandidateError, ModelError, SimulationError):
+        if names:
+            candidate = space.decode(space.bounds.mean(axis=1))
+            problem.model.simulate(candidate.signals, numbers(problem, candidate), brief)
+            return names
+    return ()
+
+
 def _shortest(problem: Problem) -> float:
     """Return the shortest simulation in s in which every component steps."""
     interval, model = problem.experiment.output_interval, problem.model

@@ -270,8 +270,10 @@ def _recording(
     outputs = [v.name for v in info.outputs if v.kind != "string"]
     if not outputs and len(info.observables) <= _MAX_RECORDED:
         outputs = [v.name for v in info.observables if v.kind != "string"]
-    if unknown := next((name for name in omitted if name not in outputs), None):
-        raise SpecError(f"no output {unknown!r}; {did_you_mean(unknown, outputs)}", key=omitted[unknown])
+    internals = [v.name for v in info.internals if v.name not in outputs]
+    if unknown := next((name for name in omitted if name not in (*outputs, *internals)), None):
+        near = did_you_mean(unknown, [*outputs, *internals])
+        raise SpecError(f"no output {unknown!r}; {near}", key=omitted[unknown])
     outputs = [name for name in outputs if name not in omitted]
     for name in extra:
         if name not in info:
@@ -281,7 +283,8 @@ def _recording(
             raise SpecError(f"{name!r} is a string; only numbers can be recorded", key="model.record")
         if name not in outputs and not (info[name].causality == "input" and name in known):
             outputs.append(name)
-    return replace(experiment, outputs=tuple(outputs))
+    internals = [name for name in internals if name not in omitted]
+    return replace(experiment, outputs=tuple(outputs), internals=tuple(internals))
 
 
 def _nothing_to_search(info: ModelInfo, changes: ModelChanges) -> SpecError:

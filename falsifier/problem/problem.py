@@ -111,7 +111,7 @@ class Problem:
             interface: interface of the FMU; default: co-simulation if the FMU offers it. The components of a
                 system have interfaces of their own.
             context: files that a language model may read, and ``fmu`` for what lies inside the FMU.
-            omit: outputs not to record, such as one that becomes NaN and that no formula names.
+            omit: outputs and internal variables not to record, such as one that becomes NaN.
             allow: what the FMU may do beyond changing its own folders: ``write:PATH``, ``read:PATH`` (a file
                 or folder that may hold keys), ``programs`` (execute programs).
             deny: what it may not do: ``network`` (open connections).
@@ -166,6 +166,11 @@ class Problem:
         source = self.source and self.source.model_copy(update={"record": outputs})
         changed = replace(self, experiment=replace(self.experiment, outputs=outputs), source=source)
         return self if outputs == self.experiment.outputs else changed
+
+    def watching(self, internals: Iterable[str], *, only_modes: bool = False) -> "Problem":
+        """Return the problem with these variables recorded after its own; or with those that are not real."""
+        watched = (name for name in internals if not only_modes or self.info.kind(name) != "real")
+        return self.recording((*self.experiment.outputs, *watched))
 
     @property
     def info(self) -> ModelInfo:

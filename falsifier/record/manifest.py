@@ -102,6 +102,9 @@ class Manifest(Surroundings):
     not_searched: tuple[Held, ...] = Field(
         description="The other inputs and the parameters, with the values at which they are held."
     )
+    internals: tuple[str, ...] = Field(
+        (), description="Internal variables that were recorded for the engine beside those of the problem."
+    )
     modes: tuple[ModeRecord, ...] = Field(description="Recorded integers, Booleans and enumerations.")
     stop_time: float = Field(description="End of each simulation in s.")
     allow: tuple[str, ...] = Field((), description="What the FMU was allowed beyond its own folders.")
@@ -173,12 +176,16 @@ def write(directory: Path, manifest: Manifest) -> None:
 
 
 def describe(
-    request: RunRequest, problems: Sequence[Problem], engine: str, hashes: dict[str, str] | None = None
+    request: RunRequest,
+    problems: Sequence[Problem],
+    engine: str,
+    internals: tuple[str, ...] = (),
+    hashes: dict[str, str] | None = None,
 ) -> Manifest:
     """Make the manifest of a run before it starts.
 
-    The problems differ only in their requirement. The hashes are of the files when these were loaded, see
-    file_hashes; None: as they are now.
+    The problems differ only in their requirement; the internal variables are recorded, too. The hashes are of
+    the files when these were loaded, see file_hashes; None: as they are now.
     """
     problem = problems[0]
     space, used = problem.space, engine_parameterization(request.engine, request.llm)
@@ -198,7 +205,8 @@ def describe(
         inputs=space.inputs,
         parameters=space.parameters,
         not_searched=problem.held,
-        modes=tuple(_modes(problem)),
+        internals=internals,
+        modes=tuple(_modes(problem.watching(internals))),
         stop_time=space.stop_time,
         allow=tuple(getattr(problem.model, "allow", ())),
         deny=tuple(getattr(problem.model, "deny", ())),

@@ -17,6 +17,7 @@ from falsifier.core.words import counted
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import KNOWN, Engine
 from falsifier.errors import JournalError, SpecError
+from falsifier.evaluation.evaluate import readable_internals
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
 from falsifier.problem.loading import load_source, reloadable
@@ -278,14 +279,17 @@ def carry_out(
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         recorded = manifest.read(directory) if begun and directory else None
         told = told_problems(request, problems, recorded.contexts if recorded else {})
-        engines = [engine] if engine is not None else make_engines(request, told, chat)
-        known = [replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from]
         for problem in problems:
             stack.callback(problem.model.close)
+        internals = recorded.internals if recorded else ()
+        if recorded is None and engine is None:
+            internals = readable_internals(problems[0])
+        engines = [engine] if engine is not None else make_engines(request, told, chat, internals)
+        known = [replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from]
         steps = Steps(stack.enter_context(local_executor(request.jobs, problems[0].model)))
         all_listeners = tuple(listeners)
         if directory is not None:
-            described = manifest.describe(request, told, engines[0].name, hashes)
+            described = manifest.describe(request, told, engines[0].name, internals, hashes)
             if recorded is not None:
                 manifest.check_unchanged(directory, recorded.hashes, described.hashes)
                 manifest.check_unchanged(directory, recorded.fingerprints, described.fingerprints)
@@ -302,7 +306,7 @@ def carry_out(
             # What happens is recorded first, even if another listener raises.
             all_listeners = (journal, StopFile(stop, request.budget), *all_listeners)
         return search(
-            problems,
+            [problem.watching(internals) for problem in problems],
             engines,
             request.budget,
             known=known,

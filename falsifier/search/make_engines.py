@@ -24,8 +24,13 @@ LLM_ENGINES = ("llm", "hybrid")
 _SEED_STRIDE = 1_000_003
 
 
-def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | None) -> list[Engine]:
+def make_engines(
+    request: RunRequest, problems: Sequence[Problem], chat: Chat | None, internals: tuple[str, ...] = ()
+) -> list[Engine]:
     """Make the engines of a request, one per problem; a chat is given if it was made in Python.
+
+    The internal variables are recorded, and engines learn from them; a language model is told the modes
+    alone, which change rarely: prompts would become long.
 
     Raises:
         SpecError: for an unknown engine, an engine that does not fit the language model, or a cost limit
@@ -37,7 +42,7 @@ def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | 
     llm = request.llm
     if llm is None:
         name = request.engine or DEFAULT_ENGINE
-        return [make_engine(name, problem, seed=seed) for problem, seed in seeded]
+        return [make_engine(name, problem.watching(internals), seed=seed) for problem, seed in seeded]
     from falsifier.engines.llm import LLMEngine
     from falsifier.llm.client import LiteLLMChat
     from falsifier.llm.litellm_adapter import load_litellm
@@ -47,9 +52,17 @@ def make_engines(request: RunRequest, problems: Sequence[Problem], chat: Chat | 
         load_litellm()  # takes seconds, which do not count before the search begins
     engines: list[Engine] = []
     for problem, seed in seeded:
-        led = LLMEngine(problem, chat, variant=llm.variant, sample=request.seed, anonymous=llm.anonymous)
-        is_hybrid = request.engine == "hybrid"
-        engines.append(make_engine("hybrid", problem, seed=seed, adviser=led) if is_hybrid else led)
+        led = LLMEngine(
+            problem.watching(internals, only_modes=True),
+            chat,
+            variant=llm.variant,
+            sample=request.seed,
+            anonymous=llm.anonymous,
+        )
+        if request.engine == "hybrid":
+            engines.append(make_engine("hybrid", problem.watching(internals), seed=seed, adviser=led))
+        else:
+            engines.append(led)
     return engines
 
 

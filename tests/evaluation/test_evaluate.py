@@ -12,7 +12,7 @@ from falsifier.core.model import Variable
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, SearchSpace
 from falsifier.errors import CandidateError, FalsifierError, SimulationError, SpecError
-from falsifier.evaluation.evaluate import evaluate, judge, simulate, start_values
+from falsifier.evaluation.evaluate import evaluate, judge, readable_internals, simulate, start_values
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.testing import START, lag_problem
@@ -145,6 +145,15 @@ def test_a_component_whose_step_is_longer_than_an_output_step_is_no_hindrance() 
     problem = load_problem("ATsplit1")  # the shift logic runs every 0.04 s, the outputs are read every 0.01 s
     assert start_values(problem)["car.rpm"] == (1000.0, 1000.0)
     problem.model.close()
+
+
+def test_internal_variables_are_recorded_if_the_model_lets_them_be_read() -> None:
+    shifting = load_problem("AT1")
+    assert readable_internals(shifting) == ("engine", "wheel")
+    shifting.model.close()
+    simple = lag_problem()
+    refused = replace(simple, experiment=replace(simple.experiment, internals=("hidden",)))
+    assert readable_internals(refused) == ()
 
 
 def test_what_cannot_be_initialised_has_no_start() -> None:

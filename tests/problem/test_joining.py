@@ -12,6 +12,7 @@ from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.fmu import read_info
 from falsifier.problem.joining import Joined, join, join_formula, placed
+from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import search_space
 from falsifier.problem.requirement import parse_requirement
@@ -184,6 +185,15 @@ def test_outputs_may_be_left_out_unless_the_formula_names_them() -> None:
     assert recorded() - recorded("out_Integer", "out_Real") == {"out_Integer"}
     with pytest.raises(SpecError, match=r"omit: no output 'out_Int'; did you mean 'out_Integer'"):
         recorded("out_Int")
+
+
+def test_searches_record_states_and_modes_that_are_no_outputs_unless_they_are_omitted() -> None:
+    chased = load_problem("CC1").experiment
+    assert chased.outputs == ("y1", "y2", "y3", "y4", "y5")
+    assert chased.internals[:3] == ("v1", "car2.y", "car2.v")
+    assert chased.internals[-4:] == ("car2.mode", "car3.mode", "car4.mode", "car5.mode")
+    shifting = Problem.from_fmu(bundled("fmus") / "AT.fmu", "G[0,20] (speed <= 120)", omit=["wheel"])
+    assert shifting.experiment.internals == ("engine",)
 
 
 def test_items_of_enumerations_may_be_named() -> None:

@@ -231,6 +231,31 @@ def test_a_loaded_problem_that_was_changed_counts_as_made_in_python(tmp_path: Pa
     assert manifest.read(tmp_path).request.problems == ()
 
 
+def test_engines_see_internal_variables_and_a_resumed_run_those_that_it_had(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = falsify("AT6a", budget=4, seed=3)
+    falsify("AT6a", budget=2, seed=3, directory=tmp_path / "a")
+    assert manifest.read(tmp_path / "a").internals == ("engine", "wheel")
+    monkeypatch.setattr("falsifier.record.run.readable_internals", lambda problem: ())
+    (continued,) = resume(tmp_path / "a", budget=4)
+    for result in (whole, continued):
+        assert result.best is not None and result.best.trajectory is not None
+        assert {"speed", "engine", "wheel"} <= set(result.best.trajectory.names)
+    assert [e.robustness for e in continued.evaluations] == [e.robustness for e in whole.evaluations]
+    unseen = falsify("AT6a", budget=4, seed=3)
+    assert [e.robustness for e in unseen.evaluations] != [e.robustness for e in whole.evaluations]
+
+
+def test_of_internal_variables_prompts_tell_the_modes() -> None:
+    chat = ScriptedChat(["{}"] * 9)
+    best = falsify("CC3", "hybrid", llm=chat, budget=3).best
+    assert best is not None and best.trajectory is not None and "car2.v" in best.trajectory.names
+    asked = [str(request.messages) for request in chat.requests]
+    assert asked and all("- car2.mode, integer: 1 keeping, 2 chasing, 3 braking" in text for text in asked)
+    assert not any("car2.v" in text for text in asked)
+
+
 def test_a_run_is_resumed_with_the_problems_that_it_searched(tmp_path: Path) -> None:
     loose = lag_problem("G[0,10] (x <= 5)", name="loose")
     falsify(loose, "uniform", budget=2, directory=tmp_path / "one")

@@ -131,9 +131,10 @@ def _continuous(
 
 
 def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> str:
-    there, untold = [], view.untold
+    there, untold, experiment = [], view.untold, view.experiment
+    for_engines = set(experiment.internals).difference(experiment.outputs)
     for name, value in trajectory.at(diagnosis.critical_time).items():
-        if name in untold:
+        if name in untold or name in for_engines:
             continue
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
         unit = f" {unit}" if (unit := view.variable(name).unit) else ""
