@@ -234,16 +234,16 @@ def test_a_loaded_problem_that_was_changed_counts_as_made_in_python(tmp_path: Pa
 def test_engines_see_internal_variables_and_a_resumed_run_those_that_it_had(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = falsify("AT6a", budget=4, seed=3)
-    falsify("AT6a", budget=2, seed=3, directory=tmp_path / "a")
-    assert manifest.read(tmp_path / "a").internals == ("engine", "wheel")
+    whole = falsify("CC4", budget=7, seed=3)
+    falsify("CC4", budget=4, seed=3, directory=tmp_path / "a")
+    assert manifest.read(tmp_path / "a").internals[-1] == "car5.mode"
     monkeypatch.setattr("falsifier.record.run.readable_internals", lambda problem: ())
-    (continued,) = resume(tmp_path / "a", budget=4)
+    (continued,) = resume(tmp_path / "a", budget=7)
     for result in (whole, continued):
         assert result.best is not None and result.best.trajectory is not None
-        assert {"speed", "engine", "wheel"} <= set(result.best.trajectory.names)
+        assert {"y1", "v1", "car5.mode"} <= set(result.best.trajectory.names)
     assert [e.robustness for e in continued.evaluations] == [e.robustness for e in whole.evaluations]
-    unseen = falsify("AT6a", budget=4, seed=3)
+    unseen = falsify("CC4", budget=7, seed=3)
     assert [e.robustness for e in unseen.evaluations] != [e.robustness for e in whole.evaluations]
 
 
