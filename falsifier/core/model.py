@@ -322,7 +322,8 @@ class Experiment:
         time_limit: maximum wall-clock time of one simulation in s; None: as long as it makes progress, see
             ``falsifier.fmu.process.plan``.
         strings: names and values of string parameters.
-        internals: internal variables that searches record, too, as engines learn from them.
+        internals: internal variables that searches record, too, as engines learn from them where the
+            requirement compares nothing but discrete signals.
 
     Raises:
         SpecError: naming the attribute that is not as above.

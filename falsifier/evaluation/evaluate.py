@@ -1,6 +1,6 @@
 """Evaluation of a candidate: simulate it and monitor the trajectory."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -216,13 +216,16 @@ def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
     return {name: (min(at[name] for at in found), max(at[name] for at in found)) for name in names}
 
 
-def readable_internals(problem: Problem) -> tuple[str, ...]:
+def readable_internals(problems: Sequence[Problem]) -> tuple[str, ...]:
     """Return the internal variables to record in a search; none if the model cannot be asked for them.
 
-    To see that, the model is initialised in the middle of the search space, and steps as above.
+    To see that, the model is initialised in the middle of the search space, and steps as above. The problems
+    differ only in their requirement.
     """
+    problem = problems[0]
     space, experiment = problem.space, problem.experiment
-    names = tuple(name for name in experiment.internals if name not in experiment.outputs)
+    named = dict.fromkeys(name for p in problems for name in p.experiment.internals)
+    names = tuple(name for name in named if name not in experiment.outputs)
     brief = replace(experiment, stop_time=_shortest(problem), outputs=(*experiment.outputs, *names))
     with suppress(CandidateError, ModelError, SimulationError):
         if names:

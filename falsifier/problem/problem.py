@@ -168,8 +168,9 @@ class Problem:
         return self if outputs == self.experiment.outputs else changed
 
     def watching(self, internals: Iterable[str], *, only_modes: bool = False) -> "Problem":
-        """Return the problem with these variables recorded after its own; or with those that are not real."""
-        watched = (name for name in internals if not only_modes or self.info.kind(name) != "real")
+        """Return the problem with those recorded after its own that are its internals; or with its modes."""
+        own = (name for name in internals if name in self.experiment.internals)
+        watched = (name for name in own if not only_modes or self.info.kind(name) != "real")
         return self.recording((*self.experiment.outputs, *watched))
 
     @property

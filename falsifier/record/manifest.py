@@ -206,7 +206,7 @@ def describe(
         parameters=space.parameters,
         not_searched=problem.held,
         internals=internals,
-        modes=tuple(_modes(problem.watching(internals))),
+        modes=tuple(_modes(problem, internals)),
         stop_time=space.stop_time,
         allow=tuple(getattr(problem.model, "allow", ())),
         deny=tuple(getattr(problem.model, "deny", ())),
@@ -262,8 +262,8 @@ def loading(
         raise
 
 
-def _modes(problem: Problem) -> Iterator[ModeRecord]:
-    for name in problem.experiment.outputs:
+def _modes(problem: Problem, internals: tuple[str, ...]) -> Iterator[ModeRecord]:
+    for name in (*problem.experiment.outputs, *internals):
         variable = problem.info[name] if name in problem.info else Variable(name)
         if variable.kind in ("integer", "boolean", "enumeration"):
             yield ModeRecord(name=name, kind=variable.kind, items=variable.items)

@@ -283,7 +283,8 @@ def carry_out(
             stack.callback(problem.model.close)
         internals = recorded.internals if recorded else ()
         if recorded is None and engine is None:
-            internals = readable_internals(problems[0])
+            internals = readable_internals(problems)
+        watched = [p for group in alike(p.watching(internals) for p in problems) for p in group]
         engines = [engine] if engine is not None else make_engines(request, told, chat, internals)
         known = [replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from]
         steps = Steps(stack.enter_context(local_executor(request.jobs, problems[0].model)))
@@ -306,7 +307,7 @@ def carry_out(
             # What happens is recorded first, even if another listener raises.
             all_listeners = (journal, StopFile(stop, request.budget), *all_listeners)
         return search(
-            [problem.watching(internals) for problem in problems],
+            watched,
             engines,
             request.budget,
             known=known,

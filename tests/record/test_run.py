@@ -231,25 +231,31 @@ def test_a_loaded_problem_that_was_changed_counts_as_made_in_python(tmp_path: Pa
     assert manifest.read(tmp_path).request.problems == ()
 
 
+CHASE = "G[0,100] (car5.mode <= 2)"
+
+
 def test_engines_see_internal_variables_and_a_resumed_run_those_that_it_had(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    whole = falsify("CC4", budget=7, seed=3)
-    falsify("CC4", budget=4, seed=3, directory=tmp_path / "a")
-    assert manifest.read(tmp_path / "a").internals[-1] == "car5.mode"
-    monkeypatch.setattr("falsifier.record.run.readable_internals", lambda problem: ())
-    (continued,) = resume(tmp_path / "a", budget=7)
-    for result in (whole, continued):
+    fmu = bundled("fmus") / "CC.fmu"
+    problems = [Problem.from_fmu(fmu, CHASE), Problem.from_fmu(fmu, "G[0,9] (y1 <= 9)", name="slope")]
+    whole = falsify(problems, budget=20, seed=3)
+    falsify(problems, budget=4, seed=3, directory=tmp_path / "a")
+    assert manifest.read(tmp_path / "a").internals[-1] == "car4.mode"
+    monkeypatch.setattr("falsifier.record.run.readable_internals", lambda problems: ())
+    continued = resume(tmp_path / "a", budget=20)
+    for result in (*whole, *continued):
         assert result.best is not None and result.best.trajectory is not None
-        assert {"y1", "v1", "car5.mode"} <= set(result.best.trajectory.names)
-    assert [e.robustness for e in continued.evaluations] == [e.robustness for e in whole.evaluations]
-    unseen = falsify("CC4", budget=7, seed=3)
-    assert [e.robustness for e in unseen.evaluations] != [e.robustness for e in whole.evaluations]
+        assert {"y1", "v1", "car4.mode"} <= set(result.best.trajectory.names)
+    unseen = falsify(problems, budget=20, seed=3)
+    tried = [[e.candidate.key for e in results[0].evaluations] for results in (whole, continued, unseen)]
+    assert tried[0] == tried[1] != tried[2]
 
 
 def test_of_internal_variables_prompts_tell_the_modes() -> None:
+    problem = Problem.from_fmu(bundled("fmus") / "CC.fmu", CHASE)
     chat = ScriptedChat(["{}"] * 9)
-    best = falsify("CC3", "hybrid", llm=chat, budget=3).best
+    best = falsify(problem, "hybrid", llm=chat, budget=3).best
     assert best is not None and best.trajectory is not None and "car2.v" in best.trajectory.names
     asked = [str(request.messages) for request in chat.requests]
     assert asked and all("- car2.mode, integer: 1 keeping, 2 chasing, 3 braking" in text for text in asked)

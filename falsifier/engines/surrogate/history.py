@@ -1,6 +1,5 @@
 """The simulations so far, in the form that learning and planning need."""
 
-from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,8 +14,6 @@ from falsifier.problem.problem import Problem
 
 # Maximum number of outputs that are predicted: those of the formula, then others. Limits the time of a fit.
 _MOST_OUTPUTS = 12
-# Correlation from which two signals are one.
-_COPY = 1.0 - 1e-9
 # Samples per cell from which the mean of an input is calculated: none is at an end, so that a held input is
 # read between its switches.
 _FINE = 8
@@ -67,7 +64,6 @@ class History:
         driven = {r.name for r in problem.space.inputs}
         outputs = [name for name in problem.experiment.outputs if name not in driven]
         outputs.sort(key=lambda name: name not in formula.signals)
-        outputs = _without_copies(outputs, trajectory, problem.experiment.internals)
         self._discrete = frozenset(
             name for name in outputs if is_discrete(learnable(trajectory[name]), kind=problem.info.kind(name))
         )
@@ -131,18 +127,3 @@ class History:
             np.concatenate(predicate) for predicate in zip(*(s.margins for s in self.samples), strict=True)
         ]
         return [int(i) for i in np.argsort(cost.cost(stacked), kind="stable")]
-
-
-def _without_copies(names: Sequence[str], trajectory: Trajectory, internals: Collection[str]) -> list[str]:
-    """Leave out internal variables of which one before them is a multiple, as outputs of states are.
-
-    Told twice, dynamics trust such a signal too much.
-    """
-    kept: dict[str, Array] = {}
-    for name in names:
-        column = learnable(trajectory[name])
-        column = column - column.mean()
-        column = column / (np.linalg.norm(column) or 1.0)
-        if name not in internals or not any(abs(column @ other) > _COPY for other in kept.values()):
-            kept[name] = column
-    return list(kept)
