@@ -15,7 +15,7 @@ from falsifier.core.literals import digits
 from falsifier.core.signals import Signal
 from falsifier.core.space import ValueKind
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import SimulationError, SpecError, did_you_mean
+from falsifier.errors import OutputError, SpecError, did_you_mean
 
 Kind = Literal[ValueKind, "string"]
 Causality = Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
@@ -399,11 +399,11 @@ class Model(Protocol):
 def check_finite(
     model: str, times: NDArray[np.float64], columns: Mapping[str, NDArray[np.float64]], *, hint: str = ""
 ) -> None:
-    """Reject outputs with NaN or inf; SimulationError naming the output and the first time of one."""
+    """Reject outputs with NaN or inf; OutputError naming the output and the first time of one."""
     for name, column in columns.items():
         finite = np.isfinite(column)
         if not finite.all():
             k = int(np.argmin(finite))
-            raise SimulationError(
+            raise OutputError(
                 f"{model}: output {name!r} is {column[k]} at t = {times[k]:g} s{hint}", time=float(times[k])
             )

@@ -1,6 +1,6 @@
 """Evaluation of a candidate: simulate it and monitor the trajectory."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -17,7 +17,15 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.model import GRID_ROUNDING, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean, shown
+from falsifier.errors import (
+    CandidateError,
+    ModelError,
+    MonitorError,
+    OutputError,
+    SimulationError,
+    did_you_mean,
+    shown,
+)
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import System
 from falsifier.problem.problem import Problem, check_problem
@@ -90,6 +98,11 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
     try:
         outputs = problem.model.simulate(candidate.signals, numbers(problem, candidate), experiment)
     except SimulationError as error:
+        extra = set(experiment.internals).difference(problem.requirement.formula.signals)
+        own = tuple(name for name in experiment.outputs if name not in extra)
+        if isinstance(error, OutputError) and own != experiment.outputs:
+            # What engines learn from beside must not fail a simulation.
+            return evaluate_any(replace(problem, experiment=replace(experiment, outputs=own)), candidate)
         seconds = perf_counter() - started
         return Evaluation(candidate, error.status, None, str(error), None, seconds, error.log)
     seconds = perf_counter() - started
@@ -216,13 +229,16 @@ def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
     return {name: (min(at[name] for at in found), max(at[name] for at in found)) for name in names}
 
 
-def readable_internals(problem: Problem) -> tuple[str, ...]:
+def readable_internals(problems: Sequence[Problem]) -> tuple[str, ...]:
     """Return the internal variables to record in a search; none if the model cannot be asked for them.
 
-    To see that, the model is initialised in the middle of the search space, and steps as above.
+    To see that, the model is initialised in the middle of the search space, and steps as above. What one of
+    the problems omits or records itself is left out.
     """
+    problem, *others = problems
     space, experiment = problem.space, problem.experiment
-    names = tuple(name for name in experiment.internals if name not in experiment.outputs)
+    common = set(experiment.internals).intersection(*(p.experiment.internals for p in others))
+    names = tuple(name for name in experiment.internals if name in common.difference(experiment.outputs))
     brief = replace(experiment, stop_time=_shortest(problem), outputs=(*experiment.outputs, *names))
     with suppress(CandidateError, ModelError, SimulationError):
         if names:

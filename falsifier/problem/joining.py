@@ -283,7 +283,7 @@ def _recording(
             raise SpecError(f"{name!r} is a string; only numbers can be recorded", key="model.record")
         if name not in outputs and not (info[name].causality == "input" and name in known):
             outputs.append(name)
-    internals = [name for name in internals if name not in omitted]
+    internals = [name for name in internals if name not in (*omitted, *outputs)]
     return replace(experiment, outputs=tuple(outputs), internals=tuple(internals))
 
 

@@ -310,7 +310,7 @@ def alike(problems: Iterable[Problem]) -> list[list[Problem]]:
     """Group problems that are simulated alike; within a group all record the same signals."""
     groups: list[tuple[object, list[Problem]]] = []
     for problem in problems:
-        bare = replace(problem.experiment, outputs=())
+        bare = replace(problem.experiment, outputs=(), internals=())
         simulated = (problem.model, problem.space, bare, problem.parameters)
         group = next((members for other, members in groups if other == simulated), [])
         if not group:

@@ -149,11 +149,11 @@ def test_a_component_whose_step_is_longer_than_an_output_step_is_no_hindrance() 
 
 def test_internal_variables_are_recorded_if_the_model_lets_them_be_read() -> None:
     shifting = load_problem("AT1")
-    assert readable_internals(shifting) == ("engine", "wheel")
+    assert readable_internals([shifting]) == ("engine", "wheel")
     shifting.model.close()
     simple = lag_problem()
     refused = replace(simple, experiment=replace(simple.experiment, internals=("hidden",)))
-    assert readable_internals(refused) == ()
+    assert readable_internals([refused]) == readable_internals([refused, simple]) == ()
 
 
 def test_what_cannot_be_initialised_has_no_start() -> None:
