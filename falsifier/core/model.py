@@ -260,7 +260,8 @@ class ModelInfo:
 
         Modes are integers, Booleans and enumerations that change at events; none of these becomes NaN alone.
         """
-        known = [v for v in self.with_causality("local") if not v.name.startswith(_OF_TOOLS)]
+        local = self.with_causality("local")
+        known = [v for v in local if not any(part.startswith(_OF_TOOLS) for part in v.name.split("."))]
         states = [v for v in known if v.is_state]
         modes = [v for v in known if v.variability == "discrete" and v.kind not in ("real", "string")]
         return (*states[:_MOST_INTERNALS], *modes[:_MOST_INTERNALS])
