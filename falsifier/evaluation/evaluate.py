@@ -98,8 +98,7 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
     try:
         outputs = problem.model.simulate(candidate.signals, numbers(problem, candidate), experiment)
     except SimulationError as error:
-        extra = set(experiment.internals).difference(problem.requirement.formula.signals)
-        own = tuple(name for name in experiment.outputs if name not in extra)
+        own = tuple(name for name in experiment.outputs if name not in experiment.internals)
         if isinstance(error, OutputError) and own != experiment.outputs:
             # What engines learn from beside must not fail a simulation.
             return evaluate_any(replace(problem, experiment=replace(experiment, outputs=own)), candidate)
@@ -238,7 +237,7 @@ def readable_internals(problems: Sequence[Problem]) -> tuple[str, ...]:
     problem, *others = problems
     space, experiment = problem.space, problem.experiment
     common = set(experiment.internals).intersection(*(p.experiment.internals for p in others))
-    names = tuple(name for name in experiment.internals if name in common.difference(experiment.outputs))
+    names = tuple(name for name in experiment.internals if name in common)
     brief = replace(experiment, stop_time=_shortest(problem), outputs=(*experiment.outputs, *names))
     with suppress(CandidateError, ModelError, SimulationError):
         if names:
