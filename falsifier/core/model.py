@@ -256,10 +256,7 @@ class ModelInfo:
 
     @property
     def internals(self) -> tuple[Variable, ...]:
-        """Internal variables that tell what outputs may hide: its first states and modes.
-
-        Modes are integers, Booleans and enumerations that change at events; none of these becomes NaN alone.
-        """
+        """Its first states and modes (integers, Booleans, enumerations), which outputs may hide."""
         local = self.with_causality("local")
         known = [v for v in local if not any(part.startswith(_OF_TOOLS) for part in v.name.split("."))]
         states = [v for v in known if v.is_state]
