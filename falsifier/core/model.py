@@ -333,9 +333,7 @@ class Experiment:
     tolerance: float | None = None
     time_limit: float | None = None
     strings: tuple[tuple[str, str], ...] = ()
-    internals: tuple[str, ...] = field(
-        default=(), repr=False
-    )  # no part of fingerprints: results are the same
+    internals: tuple[str, ...] = field(default=(), repr=False)  # in no fingerprint: results are the same
 
     def __post_init__(self) -> None:
         for name in ("stop_time", "output_interval"):

@@ -236,8 +236,7 @@ def readable_internals(problems: Sequence[Problem]) -> tuple[str, ...]:
     """
     problem, *others = problems
     space, experiment = problem.space, problem.experiment
-    common = set(experiment.internals).intersection(*(p.experiment.internals for p in others))
-    names = tuple(name for name in experiment.internals if name in common)
+    names = tuple(n for n in experiment.internals if all(n in p.experiment.internals for p in others))
     brief = replace(experiment, stop_time=_shortest(problem), outputs=(*experiment.outputs, *names))
     with suppress(CandidateError, ModelError, SimulationError):
         if names:

@@ -173,8 +173,7 @@ class Problem:
         """Return the problem with these variables recorded after its own; or with those that are not real."""
         watched = (name for name in internals if not only_modes or self.info.kind(name) != "real")
         changed = self.recording((*self.experiment.outputs, *watched))
-        known = replace(changed.experiment, internals=self.experiment.internals)
-        return replace(changed, experiment=known)
+        return replace(changed, experiment=replace(changed.experiment, internals=self.experiment.internals))
 
     @property
     def info(self) -> ModelInfo:
