@@ -155,6 +155,10 @@ class SimulationError(FalsifierError):
         return partial(type(self), status=self.status, time=self.time, log=self.log), (str(self),)
 
 
+class OutputError(SimulationError):
+    """An output, or another recorded variable, cannot be read, or is NaN or inf."""
+
+
 class MachineError(FalsifierError):
     """The machine does not grant what is needed."""
 

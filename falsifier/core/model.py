@@ -15,7 +15,7 @@ from falsifier.core.literals import digits
 from falsifier.core.signals import Signal
 from falsifier.core.space import ValueKind
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import SimulationError, SpecError, did_you_mean
+from falsifier.errors import OutputError, SpecError, did_you_mean
 
 Kind = Literal[ValueKind, "string"]
 Causality = Literal["input", "output", "parameter", "calculatedParameter", "local", "independent"]
@@ -256,11 +256,9 @@ class ModelInfo:
 
     @property
     def internals(self) -> tuple[Variable, ...]:
-        """Internal variables that tell what outputs may hide: its first states and modes.
-
-        Modes are integers, Booleans and enumerations that change at events; none of these becomes NaN alone.
-        """
-        known = [v for v in self.with_causality("local") if not v.name.startswith(_OF_TOOLS)]
+        """Its first states and modes (integers, Booleans, enumerations), which outputs may hide."""
+        local = self.with_causality("local")
+        known = [v for v in local if not any(part.startswith(_OF_TOOLS) for part in v.name.split("."))]
         states = [v for v in known if v.is_state]
         modes = [v for v in known if v.variability == "discrete" and v.kind not in ("real", "string")]
         return (*states[:_MOST_INTERNALS], *modes[:_MOST_INTERNALS])
@@ -336,9 +334,7 @@ class Experiment:
     tolerance: float | None = None
     time_limit: float | None = None
     strings: tuple[tuple[str, str], ...] = ()
-    internals: tuple[str, ...] = field(
-        default=(), repr=False
-    )  # no part of fingerprints: results are the same
+    internals: tuple[str, ...] = field(default=(), repr=False)  # in no fingerprint: results are the same
 
     def __post_init__(self) -> None:
         for name in ("stop_time", "output_interval"):
@@ -400,11 +396,11 @@ class Model(Protocol):
 def check_finite(
     model: str, times: NDArray[np.float64], columns: Mapping[str, NDArray[np.float64]], *, hint: str = ""
 ) -> None:
-    """Reject outputs with NaN or inf; SimulationError naming the output and the first time of one."""
+    """Reject outputs with NaN or inf; OutputError naming the output and the first time of one."""
     for name, column in columns.items():
         finite = np.isfinite(column)
         if not finite.all():
             k = int(np.argmin(finite))
-            raise SimulationError(
+            raise OutputError(
                 f"{model}: output {name!r} is {column[k]} at t = {times[k]:g} s{hint}", time=float(times[k])
             )

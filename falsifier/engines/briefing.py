@@ -9,7 +9,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.words import in_one_line
 from falsifier.errors import SpecError, setting, written
 from falsifier.evaluation.confirm import Confirmation
-from falsifier.evaluation.evaluate import Evaluation, start_values
+from falsifier.evaluation.evaluate import Evaluation, readable_internals, start_values
 from falsifier.llm import CONTEXT_VARIANT
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import Questions, Variant, View, variant_named
@@ -189,7 +189,7 @@ def preview(
         doubtful: violations among the evaluations that do not count.
         lessons: what the LLM wrote down in its last reply.
     """
-    told = problem.watching(problem.experiment.internals, only_modes=True)
+    told = problem.watching(readable_internals([problem]), only_modes=True)
     briefing = Briefing(told, variant=variant, anonymous=anonymous)
     briefing.simulations = simulations
     briefing.lessons = briefing.reason(lessons)  # those of a run with real names have these

@@ -17,7 +17,15 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.model import GRID_ROUNDING, ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import CandidateError, ModelError, MonitorError, SimulationError, did_you_mean, shown
+from falsifier.errors import (
+    CandidateError,
+    ModelError,
+    MonitorError,
+    OutputError,
+    SimulationError,
+    did_you_mean,
+    shown,
+)
 from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import System
 from falsifier.problem.problem import Problem, check_problem
@@ -90,6 +98,10 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
     try:
         outputs = problem.model.simulate(candidate.signals, numbers(problem, candidate), experiment)
     except SimulationError as error:
+        own = tuple(name for name in experiment.outputs if name not in experiment.internals)
+        if isinstance(error, OutputError) and own != experiment.outputs:
+            # What engines learn from beside must not fail a simulation.
+            return evaluate_any(replace(problem, experiment=replace(experiment, outputs=own)), candidate)
         seconds = perf_counter() - started
         return Evaluation(candidate, error.status, None, str(error), None, seconds, error.log)
     seconds = perf_counter() - started

@@ -164,14 +164,16 @@ class Problem:
         """Return the problem with these variables recorded before its own; its source says so, too."""
         outputs = tuple(dict.fromkeys((*names, *self.experiment.outputs)))
         source = self.source and self.source.model_copy(update={"record": outputs})
-        changed = replace(self, experiment=replace(self.experiment, outputs=outputs), source=source)
+        internals = tuple(name for name in self.experiment.internals if name not in outputs)
+        experiment = replace(self.experiment, outputs=outputs, internals=internals)
+        changed = replace(self, experiment=experiment, source=source)
         return self if outputs == self.experiment.outputs else changed
 
     def watching(self, internals: Iterable[str], *, only_modes: bool = False) -> "Problem":
-        """Return the problem with those recorded after its own that are its internals; or with its modes."""
-        own = (name for name in internals if name in self.experiment.internals)
-        watched = (name for name in own if not only_modes or self.info.kind(name) != "real")
-        return self.recording((*self.experiment.outputs, *watched))
+        """Return the problem with these internal variables recorded after its own; or with modes alone."""
+        watched = tuple(n for n in internals if not only_modes or self.info.kind(n) != "real")
+        changed = self.recording((*self.experiment.outputs, *watched))
+        return replace(changed, experiment=replace(changed.experiment, internals=watched))
 
     @property
     def info(self) -> ModelInfo:

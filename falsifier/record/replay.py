@@ -91,6 +91,7 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
     evaluated = {r.index: r for r in records if isinstance(r, EvaluatedRecord)}
     return ReplayedSteps(
         executor=live.executor,
+        internals=live.internals,
         replayed=len(evaluated),
         seconds=max(map(elapsed_at, records)),
         unrepeated=unrepeated,

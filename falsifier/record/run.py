@@ -284,10 +284,9 @@ def carry_out(
         internals = recorded.internals if recorded else ()
         if recorded is None and engine is None:
             internals = readable_internals(problems)
-        watched = [p for group in alike(p.watching(internals) for p in problems) for p in group]
         engines = [engine] if engine is not None else make_engines(request, told, chat, internals)
         known = [replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from]
-        steps = Steps(stack.enter_context(local_executor(request.jobs, problems[0].model)))
+        steps = Steps(stack.enter_context(local_executor(request.jobs, problems[0].model)), internals)
         all_listeners = tuple(listeners)
         if directory is not None:
             described = manifest.describe(request, told, engines[0].name, internals, hashes)
@@ -307,7 +306,7 @@ def carry_out(
             # What happens is recorded first, even if another listener raises.
             all_listeners = (journal, StopFile(stop, request.budget), *all_listeners)
         return search(
-            watched,
+            problems,
             engines,
             request.budget,
             known=known,

@@ -38,11 +38,14 @@ def make_engines(
         ChatError: for an unknown provider or a missing key.
     """
     check_names(request.engine, request.llm)
-    seeded = [(problem, request.seed + i * _SEED_STRIDE) for i, problem in enumerate(problems)]
+    # Those of other requirements would make dynamics slow: they are for robustness of few values.
+    own = [tuple(name for name in internals if name in p.experiment.internals) for p in problems]
+    seeds = [request.seed + i * _SEED_STRIDE for i in range(len(problems))]
+    prepared = list(zip(problems, own, seeds, strict=True))
     llm = request.llm
     if llm is None:
         name = request.engine or DEFAULT_ENGINE
-        return [make_engine(name, problem.watching(internals), seed=seed) for problem, seed in seeded]
+        return [make_engine(name, p.watching(watched), seed=seed) for p, watched, seed in prepared]
     from falsifier.engines.llm import LLMEngine
     from falsifier.llm.client import LiteLLMChat
     from falsifier.llm.litellm_adapter import load_litellm
@@ -51,18 +54,11 @@ def make_engines(
     if request.budget.seconds is not None and isinstance(chat, LiteLLMChat):
         load_litellm()  # takes seconds, which do not count before the search begins
     engines: list[Engine] = []
-    for problem, seed in seeded:
-        led = LLMEngine(
-            problem.watching(internals, only_modes=True),
-            chat,
-            variant=llm.variant,
-            sample=request.seed,
-            anonymous=llm.anonymous,
-        )
-        if request.engine == "hybrid":
-            engines.append(make_engine("hybrid", problem.watching(internals), seed=seed, adviser=led))
-        else:
-            engines.append(led)
+    for problem, watched, seed in prepared:
+        told = problem.watching(watched, only_modes=True)
+        led = LLMEngine(told, chat, variant=llm.variant, sample=request.seed, anonymous=llm.anonymous)
+        is_hybrid, seen = request.engine == "hybrid", problem.watching(watched)
+        engines.append(make_engine("hybrid", seen, seed=seed, adviser=led) if is_hybrid else led)
     return engines
 
 

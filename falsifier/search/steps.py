@@ -22,6 +22,7 @@ class Steps:
     """Carries out every step; a resumed run has others, which take what they can from its record."""
 
     executor: Executor | None = None  # runs the simulations; None: this process
+    internals: tuple[str, ...] = ()  # internal variables to record, too; no part of what is found
     replayed: int = 0  # number of evaluations taken from a record
     seconds: float = 0.0  # wall-clock seconds of the recorded part of the run
     # Recorded exchanges with a language model, which are played back first.
@@ -36,7 +37,7 @@ class Steps:
 
     def start(self, problem: Problem, candidates: Sequence[Candidate]) -> list[Callable[[], Evaluation]]:
         """Start to simulate and judge; return functions that wait for the evaluations, in order."""
-        return start(problem, candidates, self.executor)
+        return start(problem.watching(self.internals), candidates, self.executor)
 
     def tell(self, engine: Engine, evaluations: Sequence[Evaluation]) -> float:
         """Tell an engine; return the time that took in s."""

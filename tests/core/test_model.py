@@ -107,6 +107,12 @@ TIMES = np.linspace(0, 1, 11)
 TRAJECTORY = Trajectory(TIMES, {"x": TIMES**2, "y": -TIMES}, {"x": "m"})
 
 
+def test_what_an_exporting_tool_adds_is_no_mode() -> None:
+    names = ("mode", "$whenCondition1", "plant.$whenCondition1", "plant.mode")
+    variables = tuple(Variable(n, kind="boolean", variability="discrete") for n in names)
+    assert [v.name for v in ModelInfo("plant", variables=variables).internals] == ["mode", "plant.mode"]
+
+
 def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
     TRAJECTORY.save(tmp_path / "t.npz")
     loaded = Trajectory.load(tmp_path / "t.npz")

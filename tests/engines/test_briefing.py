@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from falsifier.context.values import Context, Named
+from falsifier.core.model import Variable
 from falsifier.engines.briefing import preview, told_context
 from falsifier.engines.llm import LLMEngine
 from falsifier.errors import SpecError
@@ -25,6 +27,15 @@ def test_a_preview_is_what_is_sent(variant: str) -> None:
     engine.ask()
     assert chat.requests[0].messages == preview(problem, variant=variant)
     assert chat.requests[1].messages == preview(problem, variant=variant, evaluations=[evaluation])
+
+
+def test_a_preview_tells_no_mode_that_cannot_be_read() -> None:
+    problem: Any = lag_problem()
+    mode = Variable("mode", kind="integer", variability="discrete")
+    info = replace(problem.info, variables=(*problem.info.variables, mode))
+    experiment = replace(problem.experiment, internals=("mode",))
+    refused = replace(problem, model=replace(problem.model, info=info), experiment=experiment)
+    assert preview(refused) == preview(problem)
 
 
 def test_a_preview_tells_lessons_if_the_variant_asks_for_them_and_hides_real_names_if_asked_to() -> None:

@@ -50,6 +50,7 @@ def test_the_fingerprint_is_of_everything_but_the_code() -> None:
 
 def test_problems_that_differ_in_their_requirement_share_a_search_and_what_they_record() -> None:
     one, other = lag_problem(name="A"), lag_problem("G[0,10] (x <= 0.5)", name="B")
+    one = replace(one, experiment=replace(one.experiment, internals=("u", "gain")))
     other = replace(other, experiment=replace(other.experiment, outputs=("u", "x")))
     apart = [
         lag_problem(points=5, name="C"),
@@ -59,6 +60,7 @@ def test_problems_that_differ_in_their_requirement_share_a_search_and_what_they_
     groups = alike([one, *apart, other])
     assert [[p.name for p in group] for group in groups] == [["A", "B"], ["C"], ["D"], ["E"]]
     assert [p.experiment.outputs for p in groups[0]] == [("x", "u")] * 2
+    assert [p.experiment.internals for p in groups[0]] == [("gain",), ()]  # what one names is not beside
 
 
 @pytest.mark.parametrize(

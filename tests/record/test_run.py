@@ -24,11 +24,11 @@ from falsifier.record import manifest
 from falsifier.record.journal import holds_run
 from falsifier.record.run import StopFile, falsify, resume
 from falsifier.search.budget import Budget
-from falsifier.search.events import Event, RunStarted
+from falsifier.search.events import Evaluated, Event, RunStarted
 from falsifier.search.make_engines import make_engines
 from falsifier.search.request import LLMSettings
-from falsifier.testing import lag_problem
-from tests.problems import easy, easy_again, hard, impossible
+from falsifier.testing import lag, lag_problem
+from tests.problems import broken, easy, easy_again, hard, impossible
 from tests.searches import Wrapped
 
 EASY = "python:tests.problems:easy"
@@ -247,9 +247,22 @@ def test_engines_see_internal_variables_and_a_resumed_run_those_that_it_had(
     for result in (*whole, *continued):
         assert result.best is not None and result.best.trajectory is not None
         assert {"y1", "v1", "car4.mode"} <= set(result.best.trajectory.names)
+        # Another version of the FMU, with which a counterexample is replayed, may not have them.
+        assert "v1" not in result.problem.experiment.outputs
     unseen = falsify(problems, budget=20, seed=3)
     tried = [[e.candidate.key for e in results[0].evaluations] for results in (whole, continued, unseen)]
     assert tried[0] == tried[1] != tried[2]
+
+
+def test_no_simulation_fails_because_of_an_internal_variable() -> None:
+    lost = lag_problem("G[0,10] (x <= 2)", response=lambda *all: {"bias": broken(*all)["x"], **lag(*all)})
+    lost = replace(lost, experiment=replace(lost.experiment, internals=("bias",)))
+    events = list[Event]()
+    found = falsify(lost, budget=30, listeners=[events.append]).evaluations
+    alone = falsify(lag_problem("G[0,10] (x <= 2)"), budget=1).evaluations
+    assert found[0].robustness == alone[0].robustness and all(e.status == "ok" for e in found)
+    told = (e.evaluation.trajectory for e in events if isinstance(e, Evaluated))
+    assert {"bias" in trajectory.names for trajectory in told if trajectory} == {False, True}
 
 
 def test_of_internal_variables_prompts_tell_the_modes() -> None:

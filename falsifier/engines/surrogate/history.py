@@ -62,7 +62,7 @@ class History:
     def _first_cost(self, trajectory: Trajectory) -> PredictedCost:
         problem, formula = self.problem, self.problem.requirement.formula
         driven = {r.name for r in problem.space.inputs}
-        outputs = [name for name in problem.experiment.outputs if name not in driven]
+        outputs = [n for n in problem.experiment.outputs if n not in driven and n in trajectory.columns]
         outputs.sort(key=lambda name: name not in formula.signals)
         self._discrete = frozenset(
             name for name in outputs if is_discrete(learnable(trajectory[name]), kind=problem.info.kind(name))
@@ -85,7 +85,12 @@ class History:
         space, grid = self.problem.space, self.grid
         points = np.round(np.arange(grid.all_cells + 1) * grid.step / trajectory.step).astype(int)
         points = np.minimum(points, len(trajectory) - 1)
-        columns = [learnable(trajectory[name][points]) for name in self.outputs]
+        columns = [
+            learnable(trajectory[name][points])
+            if name in trajectory.columns
+            else self.samples[-1].trace.states[:, k]  # an internal variable that could not be read this time
+            for k, name in enumerate(self.outputs)
+        ]
         states = np.stack(columns, axis=1) if columns else np.empty((len(points), 0))
         fine = (np.arange(grid.all_cells * _FINE) + 0.5) * grid.step / _FINE
         inputs = []

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from falsifier.core.words import readable
-from falsifier.errors import FailureStatus, FalsifierError, ModelError, SimulationError, written
+from falsifier.errors import FailureStatus, FalsifierError, ModelError, OutputError, SimulationError, written
 from falsifier.fmu.process.connection import Reply, Where
 from falsifier.fmu.process.network import Member, Network
 from falsifier.fmu.process.plan import Plan
@@ -85,7 +85,8 @@ def failure(
         return ModelError(text)
     status: FailureStatus = "timeout" if reply.where == Where.TIMEOUT else "failed"
     time = None if reply.time < 0 else reply.time
-    return SimulationError(text + last_lines(log), status=status, time=time, log=log)
+    kind = OutputError if reply.where == Where.GETTING else SimulationError
+    return kind(text + last_lines(log), status=status, time=time, log=log)
 
 
 def overdue(plan: Plan, reached: float, during: str, log: tuple[str, ...]) -> SimulationError:

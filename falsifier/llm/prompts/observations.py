@@ -131,10 +131,10 @@ def _continuous(
 
 
 def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> str:
-    there, untold, experiment = [], view.untold, view.experiment
-    for_engines = set(experiment.internals).difference(experiment.outputs)
+    there, untold, told = [], view.untold, view.recorded
     for name, value in trajectory.at(diagnosis.critical_time).items():
-        if name in untold or name in for_engines:
+        is_internal = name in view.info and view.info[name].causality == "local"
+        if name in untold or (is_internal and name not in told):
             continue
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
         unit = f" {unit}" if (unit := view.variable(name).unit) else ""
