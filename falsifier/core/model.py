@@ -32,8 +32,6 @@ _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
 }
 # The largest integer that no other one becomes as a double.
 _EXACT = 2**53 - 1
-
-
 # Maximum number of internal states, and of internal modes, that searches record; beginnings of the names that
 # tools give to what they add.
 _MOST_INTERNALS = 12
@@ -335,9 +333,8 @@ class Experiment:
     tolerance: float | None = None
     time_limit: float | None = None
     strings: tuple[tuple[str, str], ...] = ()
-    internals: tuple[str, ...] = field(
-        default=(), repr=False
-    )  # no part of fingerprints: results are the same
+    # No part of fingerprints: results are the same.
+    internals: tuple[str, ...] = field(default=(), repr=False)
 
     def __post_init__(self) -> None:
         for name in ("stop_time", "output_interval"):
