@@ -39,19 +39,6 @@ SUITES = ("arch-comp",)
 # The competition's protocol: simulations per run, and the parameterization that published results have.
 PROTOCOL_SIMULATIONS = 1500
 PROTOCOL_PARAMETERIZATION: Parameterization = "fixed"
-COLUMNS = (
-    "system",
-    "property",
-    "instance",
-    "input",
-    "parameters",
-    "falsified",
-    "simulations",
-    "simulation time",
-    "total time",
-    "robustness",
-    "stop time",
-)
 # Columns without which a file claims nothing.
 _READ = ("property", "input", "falsified", "simulations")
 _PROFILES = {"1": None, "2": "instance2"}
@@ -163,10 +150,8 @@ def export(runs: Iterable[Run]) -> dict[str, str]:
         is_instance = run.method.profile in _PROFILES.values()
         method = replace(run.method, profile="") if is_instance else run.method
         methods.setdefault(method.label, []).append(run)
-    return {
-        label: csv_text([COLUMNS, *(_exported(run).values() for run in of_method)])
-        for label, of_method in methods.items()
-    }
+    tables = {label: [_exported(run) for run in of_method] for label, of_method in methods.items()}
+    return {label: csv_text([rows[0], *(row.values() for row in rows)]) for label, rows in tables.items()}
 
 
 def read_rows(path: Path) -> list[Row]:
@@ -203,6 +188,7 @@ def tolerance(requirement: str) -> float:
 
 
 def _exported(run: Run) -> dict[str, object]:
+    """Return the row of a run, by the names of the columns in their order."""
     system, property_ = _NAMES.get(run.requirement, (run.manifest.model.rpartition(".")[2], run.requirement))
     row: dict[str, object] = {
         "system": system,

@@ -32,8 +32,6 @@ _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
 }
 # The largest integer that no other one becomes as a double.
 _EXACT = 2**53 - 1
-
-
 # Maximum number of internal states, and of internal modes, that searches record; beginnings of the names that
 # tools give to what they add.
 _MOST_INTERNALS = 12

@@ -310,14 +310,10 @@ class SearchSpace:
         missing += [p for p in self.parameters if p.name not in candidate.parameters]
         if missing:
             raise CandidateError(f"{missing[0].label} is missing")
-        outside = [
-            *(_signal_outside(r, candidate.signals[r.name]) for r in self.inputs),
-            *(
-                f"{p.label}: {value:.12g} is {outside_text(p)}"
-                for p in self.parameters
-                if is_outside(p, value := candidate.parameters[p.name])
-            ),
-        ]
+        outside = [_signal_outside(r, candidate.signals[r.name]) for r in self.inputs]
+        for p in self.parameters:
+            if is_outside(p, value := candidate.parameters[p.name]):
+                outside.append(f"{p.label}: {value:.12g} is {outside_text(p)}")
         if any(outside):
             raise CandidateError("; ".join(filter(None, outside)))
 

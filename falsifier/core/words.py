@@ -48,13 +48,10 @@ def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> l
     names = {r.name: number_names(r.kind, r.items) for r in space.parameters} if space is not None else {}
     chosen = {n: (v, names.get(n, {}).get(int(v))) for n, v in candidate.parameters.items()}
     signals = {n: s.stepped(inf if space is None else space.stop_time) for n, s in candidate.signals.items()}
-    return [
-        *(("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in signals.items()),
-        *(
-            ("parameter", f"{labels.get(n, n)} = {v:.10g}{f' ({name})' if name else ''}")
-            for n, (v, name) in chosen.items()
-        ),
-    ]
+    facts = [("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in signals.items()]
+    for n, (v, name) in chosen.items():
+        facts.append(("parameter", f"{labels.get(n, n)} = {v:.10g}{f' ({name})' if name else ''}"))
+    return facts
 
 
 def in_one_line(candidate: Candidate) -> str:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import get_args
@@ -88,10 +87,19 @@ class FmuModel(Isolated):
         """Load the library and make an instance in a worker, without simulating; ModelError if that fails."""
         load(replace(self.order, logging=True))
 
-    @property
-    def order(self) -> Order:
-        """What workers are asked to simulate."""
-        return _order(self)
+    def _make_order(self) -> Order:
+        """Make what workers are asked to simulate."""
+        description = self._description
+        through_wine = self.windows or description.needs_wine(self.interface)
+        member = Member("", self.path, self.sha256, description, None, self.interface)
+        places = {name: Place(0, name) for name in description.slots}
+        return Order(
+            network=Network(str(self.path), (member,), (), (0,), (), Coupling(), description, places),
+            key=(self.sha256, self.interface, self.logging, through_wine, self.rights),
+            logging=self.logging,
+            rights=self.rights,
+            through_wine=through_wine,
+        )
 
     def _pieces(
         self, signals: Mapping[str, Signal], experiment: Experiment
@@ -122,21 +130,6 @@ def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> 
     values = np.rint(values) if whole else values
     changes = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
     return constant_pieces(times[changes], values[changes])
-
-
-@lru_cache(maxsize=64)
-def _order(model: FmuModel) -> Order:
-    description = model._description
-    through_wine = model.windows or description.needs_wine(model.interface)
-    member = Member("", model.path, model.sha256, description, None, model.interface)
-    places = {name: Place(0, name) for name in description.slots}
-    return Order(
-        network=Network(str(model.path), (member,), (), (0,), (), Coupling(), description, places),
-        key=(model.sha256, model.interface, model.logging, through_wine, model.rights),
-        logging=model.logging,
-        rights=model.rights,
-        through_wine=through_wine,
-    )
 
 
 def _check_interface(model: FmuModel) -> None:

@@ -18,7 +18,7 @@ The first line of a template's docstring is what lists and prompts say of it.
 
 from collections.abc import Mapping
 from itertools import combinations, pairwise
-from typing import Literal
+from typing import Literal, get_args
 
 from pydantic import Field, model_validator
 
@@ -272,14 +272,8 @@ class Order(Template):
         return every if start == 0 else f"G{window(start, start)} ({every})"
 
 
+_KINDS = (Settles, Overshoot, Rise, Response, StaysWithin, NeverTogether, Dwell, RampLimit, Order)
+# By the names that their classes state.
 TEMPLATES: Mapping[str, type[Template]] = {
-    "settles": Settles,
-    "overshoot": Overshoot,
-    "rise": Rise,
-    "response": Response,
-    "stays_within": StaysWithin,
-    "never_together": NeverTogether,
-    "dwell": Dwell,
-    "ramp_limit": RampLimit,
-    "order": Order,
+    name: kind for kind in _KINDS for name in get_args(kind.model_fields["template"].annotation)
 }

@@ -4,13 +4,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from falsifier.campaigns.archcomp import COLUMNS, export, read_rows, tolerance, validate
+from falsifier.campaigns.archcomp import export, read_rows, tolerance, validate
 from falsifier.campaigns.runs import load
 from falsifier.errors import SpecError
 from falsifier.problem.problem import Problem
 from tests import problems
 
-HEADER = ",".join(COLUMNS)
+HEADER = "system,property,instance,input,parameters,falsified,simulations,"
+HEADER += "simulation time,total time,robustness,stop time"
 
 
 @pytest.fixture

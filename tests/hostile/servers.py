@@ -8,6 +8,8 @@ from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
 from typing import Any
 
+from tests.llm.server import Step, openai
+
 Behaviour = Callable[[socket.socket, bytes, threading.Event], None]
 
 GOOD = '{"rationale": "because", "signals": [{"name": "u", "values": [1, 1, 1, 1]}]}'
@@ -78,17 +80,8 @@ def _read_request(connection: socket.socket) -> bytes:
 
 def completion(content: str, **usage: Any) -> bytes:
     """Body of an OpenAI-compatible reply."""
-    message = {"role": "assistant", "content": content}
-    return json.dumps(
-        {
-            "id": "1",
-            "object": "chat.completion",
-            "created": 1,
-            "model": "m",
-            "choices": [{"index": 0, "message": message, "finish_reason": "stop"}],
-            "usage": {"prompt_tokens": 100, "completion_tokens": 30, "total_tokens": 130, **usage},
-        }
-    ).encode()
+    counts = {"prompt_tokens": 100, "completion_tokens": 30, "total_tokens": 130, **usage}
+    return json.dumps(openai(Step(content, usage=counts), {"model": "m"})).encode()
 
 
 def response(body: bytes, *, status: str = "200 OK", headers: str = "") -> bytes:

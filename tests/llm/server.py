@@ -121,7 +121,7 @@ def serving(*script: Step) -> closing[Server]:
     return closing(Server(list(script)))
 
 
-def _openai(step: Step, body: dict[str, Any]) -> dict[str, Any]:
+def openai(step: Step, body: dict[str, Any]) -> dict[str, Any]:
     message = {"role": "assistant", "content": step.content, **step.extra}
     answer = {
         "id": "1",
@@ -138,7 +138,7 @@ def _dialect(path: str) -> Callable[[Step, dict[str, Any]], dict[str, Any]]:
         return _ollama
     if path.endswith("/messages"):
         return _anthropic
-    return _gemini if "generateContent" in path else _openai
+    return _gemini if "generateContent" in path else openai
 
 
 def _anthropic(step: Step, body: dict[str, Any]) -> dict[str, Any]:

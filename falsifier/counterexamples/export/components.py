@@ -37,14 +37,6 @@ from falsifier.stl.lexer import name_text
 
 _NAMESPACE = "http://ssp-standard.org/SSP1/SystemStructure"
 _SSD, _SSC = f"{{{_NAMESPACE}Description}}", f"{{{_NAMESPACE}Common}}"
-# Types of connectors; items of enumerations are numbers here.
-_TYPES: Mapping[str, str] = {
-    "real": "Real",
-    "integer": "Integer",
-    "enumeration": "Integer",
-    "boolean": "Boolean",
-    "string": "String",
-}
 _FMU_TYPE = "application/x-fmu-sharedlibrary"
 # Folder of an export in which each component has one.
 FOLDER = "components"
@@ -233,7 +225,8 @@ def _connectors(element: Element, variables: Iterable[Variable]) -> None:
         port = SubElement(ports, f"{_SSD}Connector", {"name": variable.name, "kind": variable.causality})
         # A component's is that of the FMU, whose definition of the unit the package would have to repeat.
         unit = {"unit": variable.unit} if variable.unit and element.tag == f"{_SSD}System" else {}
-        SubElement(port, f"{_SSC}{_TYPES[variable.kind]}", unit if variable.kind == "real" else {})
+        kind = "integer" if variable.kind == "enumeration" else variable.kind  # items are numbers here
+        SubElement(port, f"{_SSC}{kind.capitalize()}", unit if kind == "real" else {})
 
 
 def _bindings(element: Element, system: System, files: Iterable[str]) -> None:

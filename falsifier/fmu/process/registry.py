@@ -162,6 +162,10 @@ class Isolated:
     @property
     def order(self) -> Order:
         """What workers are asked to simulate."""
+        return _order(self)
+
+    def _make_order(self) -> Order:
+        """Make what ``order`` keeps."""
         raise NotImplementedError
 
     @property
@@ -178,6 +182,11 @@ class Isolated:
         for name in ("allow", "deny"):
             object.__setattr__(self, name, resolved(getattr(self, name), Path()))
         _ = self.rights
+
+
+@lru_cache(maxsize=64)
+def _order(model: Isolated) -> Order:
+    return model._make_order()
 
 
 def rights_text(allow: Collection[str] = (), deny: Collection[str] = ()) -> str:

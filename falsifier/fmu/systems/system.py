@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
 
@@ -80,7 +79,7 @@ class System(Isolated):
         object.__setattr__(self, "components", components)
         object.__setattr__(self, "connections", connections)
         object.__setattr__(self, "key", _key(self))
-        _order(self)
+        _ = self.network  # checks it
 
     def __hash__(self) -> int:
         return hash(self.key)
@@ -131,10 +130,12 @@ class System(Isolated):
         for member in self.network.members:
             own_steps(member, experiment.step, experiment.stop_time, stated_as=stated_as)
 
-    @property
-    def order(self) -> Order:
-        """What workers are asked to simulate."""
-        return _order(self)
+    def _make_order(self) -> Order:
+        """Make what workers are asked to simulate."""
+        connected = {name: each for name, each in self.connections.items() if isinstance(each, Connection)}
+        network = make_network(self.name, self.parts, connected, self.coupling, self.frame)
+        key = (self.key, self.logging, self.rights)
+        return Order(network=network, key=key, logging=self.logging, rights=self.rights)
 
 
 def _key(system: System) -> str:
@@ -142,14 +143,3 @@ def _key(system: System) -> str:
     connections = sorted(system.connections.items(), key=str)
     content = (system.name, components, connections, system.coupling, system.frame)
     return sha256(repr(content).encode()).hexdigest()
-
-
-@lru_cache(maxsize=64)
-def _order(system: System) -> Order:
-    connections = {name: each for name, each in system.connections.items() if isinstance(each, Connection)}
-    return Order(
-        network=make_network(system.name, system.parts, connections, system.coupling, system.frame),
-        key=(system.key, system.logging, system.rights),
-        logging=system.logging,
-        rights=system.rights,
-    )

@@ -102,13 +102,9 @@ def as_values(view: View, candidate: Candidate) -> tuple[str, ...]:
         signal = candidate.signals[r.name]
         listed = ", ".join(_rounded(v, r.low, r.high) for v in view.space.fixed_values(r, signal))
         lines.append(f"{r.name} = [{listed}]{'' if _is_exact(view, r, signal) else _READ}")
-    return (
-        *lines,
-        *(
-            f"{p.name} = {_rounded(candidate.parameters[p.name], p.low, p.high)}"
-            for p in view.space.parameters
-        ),
-    )
+    for p in view.space.parameters:
+        lines.append(f"{p.name} = {_rounded(candidate.parameters[p.name], p.low, p.high)}")
+    return tuple(lines)
 
 
 def _rounded(value: float, low: float, high: float) -> str:

@@ -189,6 +189,10 @@ def _details(section: Section, most: int) -> Html:
     ]
     if len(runs) > 1:
         histories.append(drawn(lambda: plot_rates(runs), "Share of falsified runs over simulations"))
+    others = []
+    for other in section.shown[1:_MOST_DRAWN]:
+        heading = f"{run_name(other.run)}: after {other.run.spent.simulations_text}"
+        others.append(el("details", el("summary", heading), *_found(other), _shown_details(other)))
     return el(
         "details",
         el("summary", f"Formula, {counted(len(runs), 'run')}, engines and seeds"),
@@ -197,15 +201,7 @@ def _details(section: Section, most: int) -> Html:
         facts_html([("not searched", held)]) if held else "",
         _runs(runs),
         *histories,
-        *(
-            el(
-                "details",
-                el("summary", f"{run_name(other.run)}: after {other.run.spent.simulations_text}"),
-                *_found(other),
-                _shown_details(other),
-            )
-            for other in section.shown[1:_MOST_DRAWN]
-        ),
+        *others,
         _questions(section, most),
         class_="more",
     )

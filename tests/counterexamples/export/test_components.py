@@ -154,9 +154,8 @@ def test_the_package_follows_the_schema_of_the_standard(tmp_path: Path) -> None:
 
     links = {**LOOP, "pi.measured": Connection("plant.y", factor=0.5)}
     ssv = write_ssv({"plant.T": 3.0}, "R", tmp_path / "start_values.ssv", ModelInfo("m"))
-    file = write_package(
-        built({"plant": "Plant_2", "pi": "Gain_3"}, links), 3.0, {ssv.name: ssv}, tmp_path / "a.ssp"
-    )
-    assert [e.name for e in read_ssd(str(file), validate=True).system.elements] == ["plant", "pi"]
+    model = built({"plant": "Plant_2", "pi": "Gain_3", "echo": "Echo_2"}, links)  # with values of all types
+    file = write_package(model, 3.0, {ssv.name: ssv}, tmp_path / "a.ssp")
+    assert [e.name for e in read_ssd(str(file), validate=True).system.elements] == ["plant", "pi", "echo"]
     with zipfile.ZipFile(file) as package:  # without a unit, which it would define, it is that of the FMU
         assert b" unit=" not in package.read("SystemStructure.ssd")
