@@ -2,7 +2,9 @@
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +62,13 @@ def still(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) 
 def never(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
     """Fail always."""
     raise RuntimeError("out of order")
+
+
+def stepped(problem: Problem) -> Problem:
+    """Return a problem whose outputs, as the model says, change at events only."""
+    model: Any = problem.model
+    variables = [replace(v, variability="discrete") for v in problem.info.variables]
+    return replace(problem, model=replace(model, info=replace(model.info, variables=tuple(variables))))
 
 
 def easy() -> Problem:

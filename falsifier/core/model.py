@@ -255,7 +255,8 @@ class ModelInfo:
     @property
     def internals(self) -> tuple[Variable, ...]:
         """Its first states and modes (integers, Booleans, enumerations), which outputs may hide."""
-        local = self.with_causality("local")
+        connected = {target for _, target in self.connections}
+        local = [v for v in self.with_causality("local") if not v.alias_of and v.name not in connected]
         known = [v for v in local if not any(part.startswith(_OF_TOOLS) for part in v.name.split("."))]
         states = [v for v in known if v.is_state]
         modes = [v for v in known if v.variability == "discrete" and v.kind not in ("real", "string")]

@@ -22,7 +22,6 @@ from falsifier.problem.sections import InputSection, ModelChanges, ParameterSect
 from falsifier.problem.shorthand import searching, stated_as
 from falsifier.problem.source import STL_NAME
 from falsifier.problem.spec import AnyRequirement, Spec, overlay, parse_spec
-from falsifier.stl import Formula
 
 # Maximum number of states or locals that are recorded if the FMU declares no outputs.
 _MAX_RECORDED = 50
@@ -109,7 +108,7 @@ def join(
             model,
             Requirement(name, formula, section.description),
             space,
-            _recording(experiment, info, formula, spec.model.record, known, omitted),
+            _recording(experiment, info, [*spec.model.record, *formula.signals], known, omitted),
             fixed,
             (*info.notes, *_notes(grid, model, space, experiment)),
         )
@@ -260,15 +259,13 @@ def rights_notes(model: Model) -> Iterator[str]:
 def _recording(
     experiment: Experiment,
     info: ModelInfo,
-    formula: Formula,
-    extra: Sequence[str],
+    extra: Iterable[str],
     known: Collection[str],
     omitted: Mapping[str, str],
 ) -> Experiment:
     """Return the experiment that records all outputs and those extra variables whose values are unknown.
 
-    Internal variables are for engines whose requirement has few values of robustness. Omitted variables, with
-    the key that omits them, are recorded only if they are extra ones, too.
+    Omitted variables, with the key that omits them, are recorded only if they are extra ones, too.
     """
     outputs = [v.name for v in info.outputs if v.kind != "string"]
     if not outputs and len(info.observables) <= _MAX_RECORDED:
@@ -278,7 +275,7 @@ def _recording(
         near = did_you_mean(unknown, [*outputs, *internals])
         raise SpecError(f"no output {unknown!r}; {near}", key=omitted[unknown])
     outputs = [name for name in outputs if name not in omitted]
-    for name in (*extra, *formula.signals):
+    for name in extra:
         if name not in info:
             names = [v.name for v in info.variables]
             raise SpecError(f"unknown variable {name!r}; {did_you_mean(name, names)}", key="model.record")
@@ -286,8 +283,7 @@ def _recording(
             raise SpecError(f"{name!r} is a string; only numbers can be recorded", key="model.record")
         if name not in outputs and not (info[name].causality == "input" and name in known):
             outputs.append(name)
-    is_flat = not any(info[name].is_continuous for name in formula.signals if name not in known)
-    internals = [name for name in internals if is_flat and name not in (*omitted, *outputs)]
+    internals = [name for name in internals if name not in (*omitted, *outputs)]
     return replace(experiment, outputs=tuple(outputs), internals=tuple(internals))
 
 

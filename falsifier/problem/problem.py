@@ -176,6 +176,13 @@ class Problem:
         return replace(changed, experiment=replace(changed.experiment, internals=watched))
 
     @property
+    def internals(self) -> tuple[str, ...]:
+        """Internal variables that a search records; none if the formula compares a continuous signal."""
+        compared = set(self.requirement.formula.signals).intersection(self.experiment.outputs)
+        has_slope = any(v.is_continuous for v in self.info.variables if v.name in compared)
+        return () if has_slope else self.experiment.internals
+
+    @property
     def info(self) -> ModelInfo:
         """What is known about the model without simulating it."""
         return self.model.info

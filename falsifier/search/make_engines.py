@@ -39,7 +39,7 @@ def make_engines(
     """
     check_names(request.engine, request.llm)
     # Those of other requirements would make dynamics slow: they are for robustness of few values.
-    own = [tuple(name for name in internals if name in p.experiment.internals) for p in problems]
+    own = [tuple(name for name in internals if name in p.internals) for p in problems]
     seeds = [request.seed + i * _SEED_STRIDE for i in range(len(problems))]
     prepared = list(zip(problems, own, seeds, strict=True))
     llm = request.llm

@@ -1,6 +1,7 @@
 import math
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -107,10 +108,18 @@ TIMES = np.linspace(0, 1, 11)
 TRAJECTORY = Trajectory(TIMES, {"x": TIMES**2, "y": -TIMES}, {"x": "m"})
 
 
-def test_what_an_exporting_tool_adds_is_no_mode() -> None:
-    names = ("mode", "$whenCondition1", "plant.$whenCondition1", "plant.mode")
-    variables = tuple(Variable(n, kind="boolean", variability="discrete") for n in names)
-    assert [v.name for v in ModelInfo("plant", variables=variables).internals] == ["mode", "plant.mode"]
+def test_internal_variables_are_the_first_states_and_modes_without_copies_and_what_tools_add() -> None:
+    names = ("mode", "$whenCondition1", "plant.$whenCondition1", "plant._when", "plant.fed", "plant.mode")
+    modes = [Variable(n, kind="boolean", variability="discrete") for n in names]
+    others = [Variable("same", is_state=True, alias_of="x1"), Variable("computed")]
+    many = [*(replace(modes[0], name=f"m{k}") for k in range(20)), *map(_state, range(20))]
+    info = ModelInfo("plant", variables=(*modes, *others, *many), connections=(("mode", "plant.fed"),))
+    found = [f"x{k}" for k in range(12)] + ["mode", "plant.mode"] + [f"m{k}" for k in range(10)]
+    assert [v.name for v in info.internals] == found
+
+
+def _state(number: int) -> Variable:
+    return Variable(f"x{number}", is_state=True)
 
 
 def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:

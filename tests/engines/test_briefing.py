@@ -15,6 +15,7 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.source import ProblemSource
 from falsifier.testing import lag_problem
+from tests.problems import stepped
 
 
 @pytest.mark.parametrize("variant", ["MP1", "MP2", "MP5"])
@@ -30,7 +31,7 @@ def test_a_preview_is_what_is_sent(variant: str) -> None:
 
 
 def test_a_preview_tells_no_mode_that_cannot_be_read() -> None:
-    problem: Any = lag_problem()
+    problem: Any = stepped(lag_problem())
     mode = Variable("mode", kind="integer", variability="discrete")
     info = replace(problem.info, variables=(*problem.info.variables, mode))
     experiment = replace(problem.experiment, internals=("mode",))

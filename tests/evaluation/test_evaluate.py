@@ -17,7 +17,7 @@ from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.testing import START, lag_problem
 from tests.fmu.fixtures import altered, path as fmu_path
-from tests.problems import broken, never
+from tests.problems import broken, never, stepped
 
 FULL = Candidate({"u": Signal((0.0,), (1.0,), "constant")})
 
@@ -151,7 +151,7 @@ def test_internal_variables_are_recorded_if_the_model_lets_them_be_read() -> Non
     shifting = load_problem("AT51")
     assert readable_internals([shifting]) == ("engine", "wheel")
     shifting.model.close()
-    simple = lag_problem()
+    simple = stepped(lag_problem())
     refused = replace(simple, experiment=replace(simple.experiment, internals=("hidden",)))
     assert readable_internals([refused]) == readable_internals([simple, refused]) == ()
 

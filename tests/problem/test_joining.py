@@ -12,6 +12,7 @@ from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.fmu import read_info
 from falsifier.problem.joining import Joined, join, join_formula, placed
+from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import search_space
 from falsifier.problem.requirement import parse_requirement
@@ -188,13 +189,19 @@ def test_outputs_may_be_left_out_unless_the_formula_names_them() -> None:
 
 def test_searches_record_states_and_modes_that_are_no_outputs_where_a_requirement_has_few_values() -> None:
     def internals(formula: str, *omit: str) -> tuple[str, ...]:
-        return Problem.from_fmu(bundled("fmus") / "CC.fmu", formula, omit=omit).experiment.internals
+        return Problem.from_fmu(bundled("fmus") / "CC.fmu", formula, omit=omit).internals
 
     modes = ("car2.mode", "car3.mode", "car4.mode")
     found = internals("G[0,100] (car5.mode <= 2)")
     assert found[:3] == ("v1", "car2.y", "car2.v") and found[-3:] == modes
     assert internals("G[0,100] (car5.mode <= 2)", "v1", "car2.mode") == (*found[1:-3], *modes[1:])
     assert internals("G[0,100] (y5 - y4 <= 40)") == internals("G[0,9] (car5.mode <= 2 and y1 <= 9)") == ()
+    # An output whose start value is given is continuous, too; what is connected is an output's copy.
+    assert load_problem("CCcars1").internals == ()
+    assert load_problem("ATsplit51").internals == ("car.engine", "car.wheel")
+    chase = Problem.from_fmu(bundled("fmus") / "CC.fmu", "G[0,100] (car5.mode <= 2)")
+    slope = chase.with_requirement("G[0,100] (y5 - y4 <= 40)")
+    assert slope.internals == () and slope.with_requirement("G (car5.mode <= 2)").internals == found
 
 
 def test_items_of_enumerations_may_be_named() -> None:

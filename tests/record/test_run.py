@@ -28,7 +28,7 @@ from falsifier.search.events import Evaluated, Event, RunStarted
 from falsifier.search.make_engines import make_engines
 from falsifier.search.request import LLMSettings
 from falsifier.testing import lag, lag_problem
-from tests.problems import broken, easy, easy_again, hard, impossible
+from tests.problems import broken, easy, easy_again, hard, impossible, stepped
 from tests.searches import Wrapped
 
 EASY = "python:tests.problems:easy"
@@ -254,9 +254,29 @@ def test_engines_see_internal_variables_and_a_resumed_run_those_that_it_had(
     assert tried[0] == tried[1] != tried[2]
 
 
+def test_engines_made_in_python_and_those_of_other_requirements_see_no_internal_variables(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fmu, seen = bundled("fmus") / "CC.fmu", dict[str, Problem]()
+    chase, slope = Problem.from_fmu(fmu, CHASE), Problem.from_fmu(fmu, "G[0,9] (y1 <= 9)", name="slope")
+
+    def made(name: str, problem: Problem, **options: Any) -> Engine:
+        seen[problem.name] = problem
+        return make_engine(name, problem, **options)
+
+    monkeypatch.setattr("falsifier.search.make_engines.make_engine", made)
+    falsify([chase, slope], budget=1)
+    outputs = [problem.experiment.outputs for problem in seen.values()]
+    assert set(outputs[0]) - set(outputs[1]) == set(chase.internals)
+    events = list[Event]()
+    falsify(chase, make_engine("uniform", chase, seed=0), budget=1, listeners=[events.append])
+    (evaluation,) = (event.evaluation for event in events if isinstance(event, Evaluated))
+    assert evaluation.trajectory is not None and "v1" not in evaluation.trajectory.names
+
+
 def test_no_simulation_fails_because_of_an_internal_variable() -> None:
     lost = lag_problem("G[0,10] (x <= 2)", response=lambda *all: {"bias": broken(*all)["x"], **lag(*all)})
-    lost = replace(lost, experiment=replace(lost.experiment, internals=("bias",)))
+    lost = replace(stepped(lost), experiment=replace(lost.experiment, internals=("bias",)))
     events = list[Event]()
     found = falsify(lost, budget=30, listeners=[events.append]).evaluations
     alone = falsify(lag_problem("G[0,10] (x <= 2)"), budget=1).evaluations

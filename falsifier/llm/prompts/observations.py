@@ -131,16 +131,16 @@ def _continuous(
 
 
 def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> str:
-    there, untold, told = [], view.untold, view.recorded
+    there, inputs = [], (*view.space.inputs, *view.info.inputs)
+    told = {*view.recorded, *(each.name for each in inputs)}  # a search may record more
     for name, value in trajectory.at(diagnosis.critical_time).items():
-        is_internal = name in view.info and view.info[name].causality == "local"
-        if name in untold or (is_internal and name not in told):
+        if name not in told:
             continue
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
         unit = f" {unit}" if (unit := view.variable(name).unit) else ""
         there.append(f"{name} = {view.labelled(name, value, plain(value, decimals))}{unit}")
     time = plain(diagnosis.critical_time, _clock(view))
-    return f"{'all ' * (not untold)}signals at t = {time} s: {', '.join(there)}"
+    return f"{'all ' * (not view.untold)}signals at t = {time} s: {', '.join(there)}"
 
 
 def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[str]:
