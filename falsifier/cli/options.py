@@ -186,7 +186,8 @@ def problem_options(command: Function, *, searches: bool = True) -> Function:
             "--omit",
             multiple=True,
             metavar="OUTPUT",
-            help="Output not to record unless a formula names it, such as one that becomes NaN. Repeatable.",
+            help="Output or internal variable not to record unless a formula names it, such as one that "
+            "becomes NaN. Repeatable.",
         ),
         policy_options,
     )

@@ -183,7 +183,9 @@ class Simulation(Section):
         description="Maximum wall-clock time of one simulation in s; default: 60 per tenth of its stop time.",
     )
     logging: Truth | None = Field(None, description="Ask the FMU for its messages in every simulation.")
-    omit: tuple[str, ...] = Field((), description="Outputs not to record, such as one that becomes NaN.")
+    omit: tuple[str, ...] = Field(
+        (), description="Outputs and internal variables not to record, such as one that becomes NaN."
+    )
     allow: tuple[Recordable, ...] = Field(
         (),
         description="What the FMU may do beyond changing its own folders: write:PATH, read:PATH (a file or "

@@ -156,6 +156,30 @@ def test_internal_variables_are_recorded_if_the_model_lets_them_be_read() -> Non
     assert readable_internals([refused]) == readable_internals([simple, refused]) == ()
 
 
+def test_a_simulation_is_repeated_without_internal_variables_only_if_one_cannot_be_read(
+    tmp_path: Path,
+) -> None:
+    known, wrong = b'name="der(x)" valueReference="2"', b'name="der(x)" valueReference="99"'
+    fmu = altered(
+        fmu_path("Lag_2"), tmp_path / "lag.fmu", lambda text: text.replace(known, wrong), ending=".xml"
+    )
+    problem = Problem.from_fmu(fmu, "G[0,1] (y <= 50)", stop_time=1.0, inputs={"u": (0, 1)})
+    middle = problem.space.decode(problem.space.bounds.mean(axis=1))
+    assert evaluate(problem.recording(["der(x)"]), middle).status == "failed"
+    assert (
+        evaluate(problem.watching(["x", "der(x)"]), middle).robustness == evaluate(problem, middle).robustness
+    )
+    problem.model.close()
+    calls = list[object]()
+
+    def failing(*given: Any) -> Any:
+        calls.append(given)
+        return never(*given)
+
+    failed = lag_problem(response=failing).watching(["bias"])
+    assert evaluate(failed, failed.space.decode([0, 0, 0, 0])).status == "failed" and len(calls) == 1
+
+
 def test_what_cannot_be_initialised_has_no_start() -> None:
     assert start_values(lag_problem(response=never)) == {}
 

@@ -131,10 +131,10 @@ def _continuous(
 
 
 def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> str:
-    there, inputs = [], (*view.space.inputs, *view.info.inputs)
-    told = {*view.recorded, *(each.name for each in inputs)}  # a search may record more
+    there = []
+    told = {*view.recorded, *(r.name for r in view.space.inputs), *(v.name for v in view.info.inputs)}
     for name, value in trajectory.at(diagnosis.critical_time).items():
-        if name not in told:
+        if name not in told:  # a search may record more
             continue
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
         unit = f" {unit}" if (unit := view.variable(name).unit) else ""
