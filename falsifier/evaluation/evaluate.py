@@ -236,8 +236,7 @@ def readable_internals(problems: Sequence[Problem]) -> tuple[str, ...]:
     """
     problem = problems[0]
     space, experiment = problem.space, problem.experiment
-    named = dict.fromkeys(name for p in problems for name in p.internals)
-    names = tuple(name for name in named if name not in experiment.outputs)
+    names = tuple(dict.fromkeys(name for p in problems for name in p.internals))
     brief = replace(experiment, stop_time=_shortest(problem), outputs=(*experiment.outputs, *names))
     with suppress(CandidateError, ModelError, SimulationError):
         if names:

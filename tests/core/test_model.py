@@ -111,7 +111,7 @@ TRAJECTORY = Trajectory(TIMES, {"x": TIMES**2, "y": -TIMES}, {"x": "m"})
 def test_internal_variables_are_the_first_states_and_modes_without_copies_and_what_tools_add() -> None:
     names = ("mode", "$whenCondition1", "plant.$whenCondition1", "plant._when", "plant.fed", "plant.mode")
     modes = [Variable(n, kind="boolean", variability="discrete") for n in names]
-    others = [Variable("same", is_state=True, alias_of="x1"), Variable("computed")]
+    others = [Variable("same", is_state=True, alias_of="x1"), Variable("level", variability="discrete")]
     many = [*(replace(modes[0], name=f"m{k}") for k in range(20)), *map(_state, range(20))]
     info = ModelInfo("plant", variables=(*modes, *others, *many), connections=(("mode", "plant.fed"),))
     found = [f"x{k}" for k in range(12)] + ["mode", "plant.mode"] + [f"m{k}" for k in range(10)]

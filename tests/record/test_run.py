@@ -241,7 +241,8 @@ def test_engines_see_internal_variables_and_a_resumed_run_those_that_it_had(
     problems = [Problem.from_fmu(fmu, CHASE), Problem.from_fmu(fmu, "G[0,9] (y1 <= 9)", name="slope")]
     whole = falsify(problems, budget=20, seed=3)
     falsify(problems, budget=4, seed=3, directory=tmp_path / "a")
-    assert manifest.read(tmp_path / "a").internals[-1] == "car4.mode"
+    described = manifest.read(tmp_path / "a")
+    assert described.internals[-1] == described.modes[-1].name == "car4.mode"
     monkeypatch.setattr("falsifier.record.run.readable_internals", lambda problems: ())
     continued = resume(tmp_path / "a", budget=20)
     for result in (*whole, *continued):
@@ -268,18 +269,21 @@ def test_engines_made_in_python_and_those_of_other_requirements_see_no_internal_
     falsify([chase, slope], budget=1)
     outputs = [problem.experiment.outputs for problem in seen.values()]
     assert set(outputs[0]) - set(outputs[1]) == set(chase.internals)
+    falsify(chase, "hybrid", llm=ScriptedChat(["{}"] * 9), budget=1)
+    assert set(seen[chase.name].experiment.outputs) == set(outputs[0])
     events = list[Event]()
     falsify(chase, make_engine("uniform", chase, seed=0), budget=1, listeners=[events.append])
     (evaluation,) = (event.evaluation for event in events if isinstance(event, Evaluated))
     assert evaluation.trajectory is not None and "v1" not in evaluation.trajectory.names
 
 
-def test_no_simulation_fails_because_of_an_internal_variable() -> None:
+@pytest.mark.parametrize("seed", [0, 1])  # cannot be read the first time, only later
+def test_no_simulation_fails_because_of_an_internal_variable(seed: int) -> None:
     lost = lag_problem("G[0,10] (x <= 2)", response=lambda *all: {"bias": broken(*all)["x"], **lag(*all)})
     lost = replace(stepped(lost), experiment=replace(lost.experiment, internals=("bias",)))
     events = list[Event]()
-    found = falsify(lost, budget=30, listeners=[events.append]).evaluations
-    alone = falsify(lag_problem("G[0,10] (x <= 2)"), budget=1).evaluations
+    found = falsify(lost, budget=30, seed=seed, listeners=[events.append]).evaluations
+    alone = falsify(lag_problem("G[0,10] (x <= 2)"), budget=1, seed=seed).evaluations
     assert found[0].robustness == alone[0].robustness and all(e.status == "ok" for e in found)
     told = (e.evaluation.trajectory for e in events if isinstance(e, Evaluated))
     assert {"bias" in trajectory.names for trajectory in told if trajectory} == {False, True}
