@@ -20,7 +20,7 @@ _LARGEST = 1e25
 # 1 % of the horizon, few enough for a roll-out in milliseconds.
 CELLS = 100
 # Maximum number of held cells of an input that are few: searched as the spec's control points, such inputs
-# need fewer simulations (design/search.md).
+# need fewer simulations (design/search-evidence.md).
 _FEW_CELLS = 10
 # Maximum length of the grid in horizons of the formula; later times contribute little to the dynamics.
 _MAX_HORIZONS = 20
