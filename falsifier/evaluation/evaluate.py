@@ -93,20 +93,27 @@ def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
 
 def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
     """Evaluate a candidate that need not fit: a pure function, in whichever process it runs."""
-    experiment = problem.experiment
     started = perf_counter()
     try:
-        outputs = problem.model.simulate(candidate.signals, numbers(problem, candidate), experiment)
+        outputs = _outputs(problem, candidate)
     except SimulationError as error:
-        own = tuple(name for name in experiment.outputs if name not in experiment.internals)
-        if isinstance(error, OutputError) and own != experiment.outputs:
-            # What engines learn from beside must not fail a simulation.
-            return evaluate_any(replace(problem, experiment=replace(experiment, outputs=own)), candidate)
         seconds = perf_counter() - started
         return Evaluation(candidate, error.status, None, str(error), None, seconds, error.log)
     seconds = perf_counter() - started
     trajectory = _with_inputs(problem, candidate, outputs)
     return judge(problem, Evaluation(candidate, trajectory=trajectory, seconds=seconds, log=outputs.log))
+
+
+def _outputs(problem: Problem, candidate: Candidate) -> Trajectory:
+    """Simulate; again without internal variables if they may be why it failed: they must fail none."""
+    experiment, given = problem.experiment, numbers(problem, candidate)
+    try:
+        return problem.model.simulate(candidate.signals, given, experiment)
+    except OutputError:
+        own = tuple(name for name in experiment.outputs if name not in experiment.internals)
+        if own == experiment.outputs:
+            raise
+    return problem.model.simulate(candidate.signals, given, replace(experiment, outputs=own))
 
 
 def simulate(

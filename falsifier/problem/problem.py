@@ -172,6 +172,8 @@ class Problem:
     def watching(self, internals: Iterable[str], *, only_modes: bool = False) -> "Problem":
         """Return the problem with these internal variables recorded after its own; or with modes alone."""
         watched = tuple(n for n in internals if not only_modes or self.info.kind(n) != "real")
+        if not watched:
+            return self
         changed = self.recording((*self.experiment.outputs, *watched))
         return replace(changed, experiment=replace(changed.experiment, internals=watched))
 
