@@ -1,7 +1,7 @@
 """Four small requirements on which the default engine was developed: staircases, and parameters only.
 
 ``python bench/example_systems.py`` prints how many simulations the engines need; a miss counts as the budget.
-The figure after the @ is the number of runs with a violation. Committed table: ``bench/search.md``.
+The figure after the @ is the number of runs with a violation. Committed table: ``bench/unseen.md``.
 """
 
 import argparse

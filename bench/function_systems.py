@@ -2,7 +2,7 @@
 
 ``python -m bench.function_systems`` prints the table of ``bench/example_systems.py`` for 42 requirements: of
 the nine systems in this file and of the eight machines. They were written after an engine was
-finished; ``bench/search.md`` says beside the table what was changed after them.
+finished; ``bench/unseen.md`` says what was changed after them.
 """
 
 from collections.abc import Callable, Mapping
