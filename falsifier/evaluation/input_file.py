@@ -5,18 +5,16 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import nextafter
 from pathlib import Path
 
 from falsifier.core.literals import csv_cell, number_in
 from falsifier.core.model import ModelInfo, Variable
-from falsifier.core.signals import Signal
+from falsifier.core.signals import STEP_RAMP, Signal
 from falsifier.errors import SpecError, did_you_mean, in_section
 from falsifier.problem.unit_check import spelled
 from falsifier.stl.lexer import UNITS
 
-# Signals have one value per time. A step between two slopes becomes a ramp this long in s, which ends at the
-# time of the step: shorter than any communication step, so that no simulation sees it.
-_STEP_RAMP = 1e-9
 # The unit at the end of the name of a column, such as "t [ms]", "Time (min)" or "time_ms".
 _UNIT = re.compile(r"[\[(/_ ]\s*(\w+)\s*[\])]?$")
 
@@ -152,7 +150,7 @@ def _sloped(points: Sequence[tuple[float, float]]) -> Signal:
     for time, value in points:
         if kept and kept[-1][0] == time:
             before = kept.pop()
-            start = time - _STEP_RAMP
+            start = min(time - STEP_RAMP, nextafter(time, 0.0))  # also where such a time is rounded
             if before[1] != value and kept and kept[-1][0] < start:
                 kept.append((start, before[1]))
         # On a straight line through the last two points, the middle one changes nothing.
