@@ -87,14 +87,16 @@ def test_an_input_named_time_does_not_replace_the_times(tmp_path: Path) -> None:
     assert path.read_text() == '"time","time"\n0.0,0.5\n10.0,0.5\n'
 
 
-def test_steps_of_a_linear_input_stay_steps_for_a_solver(tmp_path: Path) -> None:
+@pytest.mark.parametrize("interval", [0.1, 360000.0])
+def test_steps_of_a_linear_input_stay_steps_for_a_solver(interval: float, tmp_path: Path) -> None:
     """At each communication point the ramp of a step begins in the step before."""
+    lag, inputs = fmu_path("Lag_2"), {"u": (-1, 1)}
     problem = Problem.from_fmu(
-        fmu_path("Lag_2"), "G (y <= 9)", inputs={"u": (-1, 1)}, interface=ME, output_interval=0.1
+        lag, "G (y <= 9)", inputs=inputs, interface=ME, stop_time=100 * interval, output_interval=interval
     )
     for step in range(1, 100):
         time = problem.experiment.times[step]
-        (file := tmp_path / "u.csv").write_text(f"t,u\n0,0\n{time},1\n{time},-1\n10,0\n")
+        (file := tmp_path / "u.csv").write_text(f"t,u\n0,0\n{time},1\n{time},-1\n{101 * interval},0\n")
         table = input_table(problem, Candidate(read_inputs(file, problem.info).signals))
         assert np.interp(time - 1e-6, table.times, table.columns["u"]) == pytest.approx(1.0, rel=1e-3)
 
