@@ -1,6 +1,7 @@
 """Checks of values that users write in Python; what is wrong is a SpecError that names the argument."""
 
 import reprlib
+import sys
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from math import isfinite
@@ -60,7 +61,9 @@ def utf_8(path: str) -> str:
         path.encode()
     except UnicodeEncodeError:
         shown = path.encode("utf-8", "backslashreplace").decode().replace("\\udc", "\\x")
-        raise SpecError(f"{shown}: the name is not valid UTF-8; rename the file or folder") from None
+        read_as = sys.getfilesystemencoding()  # other than UTF-8 with PYTHONUTF8=0 in some locales
+        cure = "rename the file or folder" if read_as == "utf-8" else "set PYTHONUTF8=1"
+        raise SpecError(f"{shown}: the name is not valid {read_as.upper()}; {cure}") from None
     return path
 
 

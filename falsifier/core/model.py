@@ -61,6 +61,7 @@ class Variable:
         type: name of its data type, such as ``Int8``; empty if unknown.
         alias_of: the name to use instead, if the model has one variable for both; such a name can be read.
         is_clocked: whether it belongs to clocks that never tick, so that it keeps its start value.
+        is_relative: whether it is a difference, which offsets of units do not move, as of temperatures.
 
     Raises:
         SpecError: if the kind or the causality is not one of those that there are.
@@ -84,6 +85,7 @@ class Variable:
     type: str = ""
     alias_of: str = ""
     is_clocked: bool = False
+    is_relative: bool = False
 
     def __post_init__(self) -> None:
         one_of("kind of a variable", self.kind, get_args(Kind))

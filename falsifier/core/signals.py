@@ -23,6 +23,9 @@ from falsifier.errors import SpecError
 Interpolation = Literal["pchip", "linear", "constant"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
+# Signals have one value per time. A step between two slopes is a ramp this long in s, which ends at the time
+# of the step: shorter than any communication step, so that no simulation sees it, and longer than roundings.
+STEP_RAMP = 2e-9
 # Added before rounding down: in floating point 0.15 / 0.05 is slightly less than 3. In s, or in hold periods.
 _TIME_ROUNDING = 1e-9
 
@@ -59,8 +62,10 @@ class Signal:
             raise SpecError(
                 f"{len(self.times)} times and {len(self.values)} values: expected equally many, one or more"
             )
-        if self.times[0] != 0.0 or any(b <= a for a, b in pairwise(self.times)):
-            raise SpecError(f"control-point times must increase strictly from 0, got {list(self.times)}")
+        disordered = next((f"{b!r} after {a!r}" for a, b in pairwise(self.times) if b <= a), "")
+        if self.times[0] != 0.0 or disordered:
+            got = disordered or f"{self.times[0]!r} as the first"
+            raise SpecError(f"control-point times must increase strictly from 0, got {got}")
         if not is_finite:
             wrong = next(v for v in (*self.times, *self.values) if not isfinite(v))
             raise SpecError(f"control-point times and values must be finite numbers, got {wrong}")
@@ -140,8 +145,8 @@ class Signal:
 
     @property
     def shortest_dwell(self) -> float | None:
-        """Shortest time in s between two changes of value; None with fewer than two changes."""
-        return min((b - a for a, b in pairwise(self.switch_times)), default=None)
+        """Shortest time in s between two changes of value, steps counted as one; None with fewer than two."""
+        return min((b - a for a, b in pairwise(self.switch_times) if b - a > 2.0 * STEP_RAMP), default=None)
 
 
 @lru_cache(maxsize=256)

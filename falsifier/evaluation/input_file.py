@@ -1,19 +1,22 @@
 """Input signals from a CSV file: a test from the field, or the input.csv of an exported counterexample."""
 
 import csv
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import nextafter
 from pathlib import Path
 
 from falsifier.core.literals import csv_cell, number_in
 from falsifier.core.model import ModelInfo, Variable
-from falsifier.core.signals import Signal
+from falsifier.core.signals import STEP_RAMP, Signal
 from falsifier.errors import SpecError, did_you_mean, in_section
+from falsifier.problem.unit_check import spelled
+from falsifier.stl.lexer import UNITS
 
-# Signals have one value per time. A step between two slopes becomes a ramp this long in s, which ends at the
-# time of the step: shorter than any communication step, so that no simulation sees it.
-_STEP_RAMP = 1e-9
+# The unit at the end of the name of a column, such as "t [ms]", "Time (min)" or "time_ms".
+_UNIT = re.compile(r"[\[(/_ ]\s*(\w+)\s*[\])]?$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,10 +57,17 @@ def _read(rows: Sequence[tuple[int, list[str]]], info: ModelInfo) -> InputFile:
     if len(rows) < 2:
         raise SpecError("expected a row of names and one or more rows of numbers")
     header = [cell.strip() for cell in rows[0][1]]
-    if len(header) == 1 and (other := next((mark for mark in ";\t" if mark in header[0]), None)):
-        raise SpecError(f"expected commas between the columns, got {other!r}: export it with commas")
-    if header[0].lower() not in ("", "t", "time") and header[0] in (v.name for v in info.inputs):
-        raise SpecError(f"the first column must be the time in s, got the input {header[0]!r}")
+    if other := next((mark for mark in ";\t" if mark in header[0]), None):
+        raise SpecError(
+            f"expected commas between the columns, got {other!r}: export it with commas, and numbers with "
+            "decimal points"
+        )
+    role = info[header[0]].causality if header[0] in info else "independent"
+    if header[0].lower() not in ("t", "time") and role != "independent":
+        raise SpecError(f"the first column must be the time in s, got the {role} {header[0]!r}")
+    unit = spelled(found[1].replace("µ", "u")) if (found := _UNIT.search(header[0])) else "s"
+    if UNITS.get(unit, 1) != 1:
+        raise SpecError(f"the time must be in s, got {header[0]!r}: multiply it by {UNITS[unit]:f}")
     columns = [_inputs_of(name, info) for name in header[1:]]
     named = [v.name for column in columns for v in column]
     if twice := next((name for name in named if named.count(name) > 1), None):
@@ -66,7 +76,7 @@ def _read(rows: Sequence[tuple[int, list[str]]], info: ModelInfo) -> InputFile:
     values: dict[str, list[float]] = {name: [] for name in named}
     for line, row in rows[1:]:
         if len(row) != len(header):
-            raise SpecError(f"row {line}: {len(row)} cells, expected {len(header)}")
+            raise SpecError(f"row {line}: {len(row)} cells, expected {len(header)} as in row {rows[0][0]}")
         times.append(_time(row[0], times, line))
         for name, cell, column in zip(header[1:], row[1:], columns, strict=True):
             if column:
@@ -95,7 +105,9 @@ def _time(cell: str, before: Sequence[float], line: int) -> float:
     if not before and time != 0.0:
         raise SpecError(f"row {line}: the first time must be 0 s, got {time:.12g} s: shift it")
     if before and time < before[-1]:
-        raise SpecError(f"row {line}: time {time:.12g} s is before {before[-1]:g} s: sort the rows by time")
+        raise SpecError(
+            f"row {line}: time {time:.12g} s is before {before[-1]:.12g} s: sort the rows by time"
+        )
     return time
 
 
@@ -138,7 +150,7 @@ def _sloped(points: Sequence[tuple[float, float]]) -> Signal:
     for time, value in points:
         if kept and kept[-1][0] == time:
             before = kept.pop()
-            start = time - _STEP_RAMP
+            start = min(time - STEP_RAMP, nextafter(time, 0.0))  # also where such a time is rounded
             if before[1] != value and kept and kept[-1][0] < start:
                 kept.append((start, before[1]))
         # On a straight line through the last two points, the middle one changes nothing.

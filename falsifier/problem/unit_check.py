@@ -106,5 +106,5 @@ def _compared(left: Expression, right: Expression, known: Mapping[str, str], uni
         yield f"{what}; compare or add quantities of the same unit only"
     elif found != (1.0, 0.0):
         factor, offset = found
-        shift = f" + {offset:.6g}" if offset else ""
+        shift = f" {'-' if offset < 0 else '+'} {abs(offset):.6g}" if offset else ""
         yield f"{what}; convert one of them: {right} in {one} is {factor:.6g} times it{shift}"

@@ -163,6 +163,8 @@ class Call(Expression):
         return function(values[0]) if len(values) == 1 else reduce(function, values)
 
 
+# Added to a temperature, with either sign, they convert it: its unit is another one then.
+_ZERO_POINTS = frozenset(("273", "273.15", "459.67"))
 # Units of plain numbers, which fit any other, and functions whose value has the unit of their operands.
 _PLAIN_UNITS, _KEEPING = ("1", "-"), ("abs", "min", "max")
 
@@ -176,6 +178,8 @@ def unit_of(expression: Expression, units: Mapping[str, str]) -> str:
         case Arithmetic("*" | "/" | "^") | Number():
             return ""
         case Call(function) if function not in _KEEPING:
+            return ""
+        case Arithmetic() if _ZERO_POINTS & {str(each).lstrip("-") for each in expression.operands}:
             return ""
     found = {unit_of(operand, units) for operand in expression.operands} - {""}
     return found.pop() if len(found) == 1 else ""

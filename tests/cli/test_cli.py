@@ -103,6 +103,11 @@ def test_files_whose_names_are_not_utf_8_are_told_before_anything_is_written(tmp
     ):
         assert "the name is not valid UTF-8; rename" in falsifier(*arguments, cwd=tmp_path, code=2).err
     assert not (tmp_path / "new").exists()
+    ascii_names = {"LC_ALL": "C", "PYTHONUTF8": "0"}  # UTF-8 names are valid, and Python does not read them
+    told = falsifier(
+        "check", "ä.fmu", "--stl", "x <= 1", cwd=tmp_path, env=ascii_names, fresh=True, code=2
+    ).err
+    assert r"\xc3\xa4.fmu: the name is not valid ASCII; set PYTHONUTF8=1" in told
 
 
 IMPORTED = """

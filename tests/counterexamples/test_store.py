@@ -108,7 +108,10 @@ def test_a_damaged_file_is_named(tmp_path: Path, content: str, message: str) -> 
     [
         ({"values": [1.0]}, r"candidate\.signals\.u: 2 times and 1 values"),
         ({"times": None}, r"candidate\.signals\.u: expected times, values and interpolation"),
-        ({"times": [0.0, 0.0]}, r"candidate\.signals\.u: control-point times must increase strictly"),
+        (
+            {"times": [0.0, 0.0]},
+            r"candidate\.signals\.u: control-point times must increase strictly from 0, got 0.0 after 0.0",
+        ),
         ({"values": ["a", "b"]}, r"candidate\.signals\.u: control-point times and values: expected"),
     ],
 )

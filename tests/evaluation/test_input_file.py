@@ -39,6 +39,14 @@ def test_a_repeated_time_is_a_step_with_the_later_value(tmp_path: Path) -> None:
     assert sloped.sample(np.array([1.0, 1.99, 2.0, 3.0])) == pytest.approx([1, 1.99, 9, 10])
 
 
+@pytest.mark.parametrize("time", [0.01, 2.0, 3.2e7])
+def test_a_step_between_slopes_is_one_at_any_time(time: float, tmp_path: Path) -> None:
+    text = f"t,u\n0,0\n{time!r},2\n{time!r},9\n{2 * time!r},11\n{4 * time!r},2\n"
+    signal = read_inputs(written(tmp_path, text), INFO).signals["u"]
+    assert signal.sample(time * np.array([0.5, 0.99, 1.0, 1.5])) == pytest.approx([1, 1.98, 9, 10], rel=1e-5)
+    assert signal.shortest_dwell == pytest.approx(time), "the step is no dwell"
+
+
 def test_integers_hold_their_values_between_rows(tmp_path: Path) -> None:
     text = "t,gear,mode\n0,1,Off\n2,2, Hill hold\n4,2,3\n"
     gear, mode = read_inputs(written(tmp_path, text), INFO).signals.values()
@@ -52,21 +60,34 @@ def test_arrays_marked_names_and_outputs_are_understood(tmp_path: Path) -> None:
     assert found.unused == ("speed",)
 
 
+@pytest.mark.parametrize("name", ["", "Time [s]", "Zeit/sec", "time_s", "Time (since start)", "x"])
+def test_the_time_may_have_any_name_that_states_no_other_unit(name: str, tmp_path: Path) -> None:
+    variables = (*INFO.variables, Variable("x", causality="independent"))
+    found = read_inputs(written(tmp_path, f"{name},u\n0,1\n2,1\n"), ModelInfo("plant", variables=variables))
+    assert found.end == 2
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("time;u\n0;1\n", "expected commas between the columns, got ';'"),
+        ("time;u\n0;1,5\n", "expected commas between the columns, got ';': .* decimal points"),
+        ("t;u, measured;gear\n0;1;1\n", "expected commas between the columns, got ';'"),
         ("", "a row of names"),
         ("t,throtle\n0,1\n", "column 'throtle'"),
         ("t,speed\n0,1\n", "no column is an input"),
         ("t,gear\n0,1\n1,1.5\n", "row 3, column gear: 1.5: expected an integer for 'gear'"),
         ("u,w\n0,1\n", "the first column must be the time in s, got the input 'u'"),
-        ("t,u\n0,1\n1\n", "row 3: 1 cells, expected 2"),
+        ("speed,u\n0,1\n", "the first column must be the time in s, got the output 'speed'"),
+        ("t [ms],u\n0,1\n", r"the time must be in s, got 't \[ms\]': multiply it by 0.001"),
+        ("Zeit (Minutes),u\n0,1\n", "multiply it by 60"),
+        ("time_h,u\n0,1\n", "multiply it by 3600"),
+        ("t/µs,u\n0,1\n", "multiply it by 0.000001"),
+        ("t,u\n0,1\n1\n", "row 3: 1 cells, expected 2 as in row 1"),
         ("t,u\n0,1\n1,high\n", "row 3, column u: expected a number, got 'high'"),
         ("t,u\n0,nan\n", "row 2, column u"),
         ("t,mode\n0,on\n", "column mode: expected a number or one of Off, Hill hold, got 'on'"),
         ("t,u\n3,1\n", "first time must be 0 s"),
-        ("t,u\n0,1\n2,1\n1,1\n", "row 4: time 1 s is before 2 s"),
+        ("t,u\n0,1\n9999999.5,1\n1,1\n", "row 4: time 1 s is before 9999999.5 s"),
         ("t,u\n0,\n", "row 2, column u: the cell is empty; expected a number"),
         ("t,w\n0,1\n", "1 numbers, expected 2"),
         ("t,u,u\n0,1,2\n", "u is given by two columns"),

@@ -109,7 +109,7 @@ class TestFreeParameterization:
     @pytest.mark.parametrize(
         ("signal", "problem"),
         [
-            ({"times": [1, 2], "values": [3, 4]}, "increase strictly from 0"),
+            ({"times": [1, 2], "values": [3, 4]}, "increase strictly from 0, got 1.0 as the first"),
             ({"times": [0, 2], "values": [3]}, "2 times and 1 values"),
             ({"times": [0, 0.01], "values": [3, 4]}, "less than 0.1 s apart"),
             ({"times": [0, 11], "values": [3, 4]}, "after the stop time"),

@@ -10,7 +10,7 @@ from tests.problem.support import AT
 
 UNITS_OF = {
     "v": "km/h", "w": "mph", "s": "m", "t": "m", "n": "1", "q": "zork", "z": "span", "u": "1/min", "r": "rpm",
-    "n1": "rad/s",
+    "n1": "rad/s", "K": "K", "C": "degC",
 }  # fmt: skip
 INFO = ModelInfo("car", variables=tuple(Variable(name, unit=unit) for name, unit in UNITS_OF.items()))
 # As the FMU defines it: ten metres.
@@ -26,6 +26,8 @@ UNITS = {"span": Unit((0, 1, 0, 0, 0, 0, 0, 0), 10.0)}
         ("G (min(v, s) <= 3)", "v is in km/h, s in m"),
         ("G (v <= -s)", "-s in m"),
         ("G (u <= n1)", "convert one of them: n1 in 1/min is 9.5493 times it"),
+        ("G (K <= C)", "C in degC; convert one of them: C in K is 1 times it + 273.15"),
+        ("G (C <= K)", "K in K; convert one of them: K in degC is 1 times it - 273.15"),
         ("G (z <= s)", "convert one of them: s in span is 0.1 times it"),
     ],
 )
@@ -35,7 +37,17 @@ def test_units_that_do_not_fit_are_named(text: str, message: str) -> None:
     assert message in found[0][1]
 
 
-FITTING = ["v <= 3", "s - t <= 3", "n <= v", "3.6*s <= v", "v/s <= w", "v^2 <= s", "v == v", "unknown <= v"]
+FITTING = [
+    "v <= 3",
+    "s - t <= 3",
+    "n <= v",
+    "3.6*s <= v",
+    "v/s <= w",
+    "v^2 <= s",
+    "v == v",
+    "unknown <= v",
+    "K - 273.15 <= C",
+]
 
 
 @pytest.mark.parametrize("text", [*FITTING, "q <= s", "u <= r"])

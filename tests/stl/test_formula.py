@@ -31,7 +31,7 @@ def test_only_listed_names_change() -> None:
     assert replaced(parse("a until b > 0"), {a: b, b: a}) == parse("b until a > 0"), "exchanged"
 
 
-X, Y = Name("x"), Name("wheel speed")
+X, Y, T = Name("x"), Name("wheel speed"), Name("T")
 COLUMNS = {"x": np.array([-4.0, 0.0, 9.0]), "wheel speed": np.array([2.0, 0.0, 3.0])}
 
 
@@ -68,7 +68,7 @@ def test_parentheses_stand_where_they_are_needed_and_nowhere_else(expression: Ex
 
 
 def test_the_unit_of_an_expression_is_that_of_its_signals() -> None:
-    units = {"x": "m", "wheel speed": "km/h", "n": "1"}
+    units = {"x": "m", "wheel speed": "km/h", "n": "1", "T": "K"}
     expressions = {
         "m": Call("abs", (Arithmetic("-", X, Number(2.0)),)),
         "km/h": Negative(Arithmetic("+", Number(3.0), Y)),
@@ -76,6 +76,9 @@ def test_the_unit_of_an_expression_is_that_of_its_signals() -> None:
     }
     assert {unit: unit_of(e, units) for unit, e in expressions.items()} == {u: u for u in expressions}
     assert unit_of(Name("n"), units) == ""
+    # In degC, or in K if it was in degC: not in the unit of T.
+    for converted in (Arithmetic("-", T, Number(273.15)), Arithmetic("+", Number(-273.15), T)):
+        assert unit_of(Call("abs", (converted,)), units) == ""
 
 
 @pytest.mark.parametrize(

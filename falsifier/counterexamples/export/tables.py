@@ -86,7 +86,7 @@ def _beginnings(problem: Problem, candidate: Candidate) -> NDArray[np.float64]:
     if any(s.interpolation == "pchip" and is_curve(s) for s in signals):
         found.append(np.linspace(0.0, experiment.stop_time, _CURVE_ROWS + 1))
     begins = np.concatenate([*found, experiment.times[:1]])
-    apart = np.abs(begins / experiment.step - np.rint(begins / experiment.step)) * experiment.step
+    apart = np.abs(begins - np.rint(begins / experiment.step) * experiment.step)
     return begins[(apart > _TIME_ROUNDING) & (begins < experiment.stop_time)]
 
 

@@ -266,6 +266,7 @@ def _variable(
         literals={item.attrib["name"]: int(item.get("value", k)) for k, item in items},
         description=element.get("description", ""),
         type=type_[1],
+        is_relative=is_true(attributes.get("relativeQuantity")),
     )
 
 

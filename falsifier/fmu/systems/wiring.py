@@ -182,7 +182,8 @@ class _Joiner:
             if factor == 0.0:
                 raise SpecError("factor = 0 passes nothing on; state another, or remove it and fix the input")
             return factor, connection.offset or 0.0, ""
-        a, b = self._variable(source).unit, self._variable(target).unit
+        output, fed = self._variable(source), self._variable(target)
+        a, b = output.unit, fed.unit
         units = self._structures[target.member].units
         known = (units if source.member == SYSTEM else self._structures[source.member].units, units)
         found = conversion(a, b, known)
@@ -191,6 +192,8 @@ class _Joiner:
                 f"the output is in {a}, the input in {b}, and neither FMU defines how to convert "
                 "one to the other; connect like units, or state factor and offset of this connection"
             )
+        if output.is_relative or fed.is_relative:
+            found = found[0], 0.0
         if found != (1.0, 0.0):
             shown = f" {found[1]:+.6g}" if found[1] else ""
             return *found, f"converted from {a} to {b}: * {found[0]:.6g}{shown}"

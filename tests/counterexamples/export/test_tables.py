@@ -18,8 +18,11 @@ from falsifier.counterexamples.export.tables import (
     write_mat,
     write_ssv,
 )
+from falsifier.evaluation.input_file import read_inputs
 from falsifier.problem.loading import load_problem
+from falsifier.problem.problem import Problem
 from falsifier.testing import lag_problem
+from tests.fmu.fixtures import ME, path as fmu_path
 
 
 def test_the_ssv_is_valid_and_reads_back(tmp_path: Path) -> None:
@@ -82,6 +85,20 @@ def test_an_input_named_time_does_not_replace_the_times(tmp_path: Path) -> None:
     table = InputTable(np.array([0.0, 10.0]), {"time": np.array([0.5, 0.5])})
     path = write_csv(table, tmp_path / "i.csv", lag_problem().model)
     assert path.read_text() == '"time","time"\n0.0,0.5\n10.0,0.5\n'
+
+
+@pytest.mark.parametrize("interval", [0.1, 360000.0])
+def test_steps_of_a_linear_input_stay_steps_for_a_solver(interval: float, tmp_path: Path) -> None:
+    """At each communication point the ramp of a step begins in the step before."""
+    lag, inputs = fmu_path("Lag_2"), {"u": (-1, 1)}
+    problem = Problem.from_fmu(
+        lag, "G (y <= 9)", inputs=inputs, interface=ME, stop_time=100 * interval, output_interval=interval
+    )
+    for step in range(1, 100):
+        time = problem.experiment.times[step]
+        (file := tmp_path / "u.csv").write_text(f"t,u\n0,0\n{time},1\n{time},-1\n{101 * interval},0\n")
+        table = input_table(problem, Candidate(read_inputs(file, problem.info).signals))
+        assert np.interp(time - 1e-6, table.times, table.columns["u"]) == pytest.approx(1.0, rel=1e-3)
 
 
 def test_steps_stand_where_the_simulation_set_them() -> None:

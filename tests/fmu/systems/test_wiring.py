@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -75,6 +76,17 @@ def test_units_are_converted_and_the_conversion_is_told() -> None:
     found = system({"plant": "Plant_2", "pi": "Gain_2kelvin"}, stated)
     (link,) = [n for n in found.network.links if n.target.name == "measured"]
     assert (link.factor, link.offset) == (1.0, 273.15)
+
+
+@pytest.mark.parametrize(("more", "offset"), [(b"", 273.15), (b' relativeQuantity="true"', 0.0)])
+def test_offsets_do_not_move_differences(more: bytes, offset: float, tmp_path: Path) -> None:
+    fmu = fixtures.altered(
+        fixtures.path("Plant_2"),
+        tmp_path / "p.fmu",
+        lambda xml: xml.replace(b'unit="m"', b'unit="degC"' + more),
+    )
+    found = system({"a": Component(fmu), "b": "Gain_2kelvin"}, {"b.measured": "a.y"})
+    assert [(n.factor, n.offset) for n in found.network.links] == [(1.0, offset)]
 
 
 def test_a_unit_that_is_missing_is_told() -> None:
