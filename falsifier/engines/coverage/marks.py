@@ -25,6 +25,8 @@ _EXACT = 16
 _LEVELS = 12
 # Changes of a trajectory that are looked at; a signal that chatters would otherwise hide the others.
 _MAX_CHANGES = 200
+# Signals whose latest changes count as what happened before another one.
+_MOST_BEFORE = 8
 # Signals beside those of the formula that are looked at: each takes some 0.2 ms per simulation.
 _MAX_SIGNALS = 200
 
@@ -142,6 +144,8 @@ def _changes(changes: list[Change]) -> Iterator[tuple[Mark, int]]:
             what = "after", change.old, change.new, before.source, before.old, before.new, gap
             yield Mark(change.source, what), change.sample
         latest[change.source] = change
+        if len(latest) > _MOST_BEFORE:
+            del latest[min(latest, key=lambda source: latest[source].sample)]
 
 
 def _levels(name: str, column: Floats) -> Iterator[tuple[Mark, int]]:
