@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import logging
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,13 +11,14 @@ from functools import cache
 from io import BytesIO
 from itertools import count
 from pathlib import Path
+from time import monotonic, sleep
 from typing import TypeVar
 
-from filelock import FileLock, Timeout
 from pydantic import BaseModel, ValidationError
 
 from falsifier.core.files import check_seal, checksum, seal, write_whole
 from falsifier.core.literals import one_line, shell_word
+from falsifier.core.posix_files import lock_file
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import JournalError, first_fault, written
 
@@ -30,6 +32,9 @@ TRAJECTORY_NAMES = r"\d+-[0-9a-f]+\.npz"
 
 # Errors of the operating system that say that a path can never be a folder.
 _NO_FOLDER = frozenset({errno.EEXIST, errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP})
+
+# How often to look whether a lock is free, in s.
+_LOCK_PERIOD = 0.05
 
 Content = TypeVar("Content", bound=BaseModel)
 
@@ -67,13 +72,17 @@ def locked(path: Path, *, busy: str, patience: float = 0.0) -> Iterator[None]:
 
     Raises:
         JournalError: if another process still holds it after that time.
+        MachineError: if the file system has no locks.
     """
+    until = monotonic() + patience
+    while (held := lock_file(path, 0o666)) is None:
+        if monotonic() > until:
+            raise JournalError(busy)
+        sleep(_LOCK_PERIOD)
     try:
-        held = FileLock(path).acquire(timeout=patience)
-    except Timeout:
-        raise JournalError(busy) from None
-    with held:
         yield
+    finally:
+        os.close(held)
 
 
 def is_locked(path: Path) -> bool:
@@ -81,8 +90,8 @@ def is_locked(path: Path) -> bool:
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError:
-        return True
+    except OSError as error:  # else its file system has no locks, so that nobody writes there
+        return isinstance(error, BlockingIOError)
     return False
 
 

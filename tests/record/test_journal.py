@@ -1,13 +1,15 @@
 """Reading and writing the record of a run."""
 
+import errno
+import os
 from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
 
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, MachineError
 from falsifier.record import journal
-from falsifier.record.files import recorded_trajectory, set_aside
+from falsifier.record.files import is_locked, recorded_trajectory, set_aside
 from falsifier.record.records import line_of
 from falsifier.record.run import falsify
 from falsifier.search.result import Result
@@ -46,6 +48,26 @@ def test_one_writer_per_directory(tmp_path: Path) -> None:
     busy = pytest.raises(JournalError, match="another process is writing")
     with journal.open_journal(tmp_path), busy, journal.open_journal(tmp_path):
         pass
+
+
+@pytest.mark.parametrize("code", [errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP])
+def test_where_there_are_no_locks_nobody_writes(
+    code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on Lustre, which clusters share: two that write to one run would damage it."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    with journal.open_journal(tmp_path):
+        assert is_locked(tmp_path / "lock")
+    monkeypatch.setattr("fcntl.flock", refuse)
+    without = pytest.raises(
+        MachineError, match=r"lock cannot be locked \(.+\): choose a folder on a file system"
+    )
+    with without, journal.open_journal(tmp_path):
+        pass
+    assert not is_locked(tmp_path / "lock")
 
 
 def test_what_a_killed_run_has_left_half_written_is_removed_when_it_is_resumed(tmp_path: Path) -> None:
