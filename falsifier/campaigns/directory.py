@@ -17,7 +17,7 @@ from falsifier.campaigns.request import CampaignRequest
 from falsifier.core.literals import shell_word
 from falsifier.errors import JournalError
 from falsifier.record.files import CAMPAIGN, is_locked, locked, make_folder, read_sealed, write_sealed
-from falsifier.record.journal import holds_run
+from falsifier.record.journal import holds_run, runs_below
 from falsifier.record.manifest import Surroundings
 
 _LOCK = "lock"
@@ -56,7 +56,8 @@ def run_directory(directory: Path, name: str) -> Path:
 def run_directories(directory: Path) -> list[Path]:
     """Directories of all runs that have started, in the campaign's order.
 
-    For a run directory, itself. For a folder that is neither but contains run directories, those.
+    For a run directory, itself. For a folder that is neither but contains run directories, those, and those
+    of specs whose requirements are searched in groups, which are a folder deeper.
 
     Raises:
         JournalError: if the directory contains neither a campaign nor a run.
@@ -66,8 +67,7 @@ def run_directories(directory: Path) -> list[Path]:
         return [p for n in named if holds_run(p := run_directory(directory, n))]
     if holds_run(directory):
         return [directory]
-    below = sorted(path for path in directory.glob("*") if holds_run(path))
-    if below:
+    if below := runs_below(directory):
         return below
     if not directory.exists():
         raise JournalError(f"{directory}: no such directory; expected that of a run or campaign")
