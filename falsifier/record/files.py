@@ -163,14 +163,15 @@ def make_folder(directory: Path) -> None:
 
 
 def check_unused(directory: Path) -> None:
-    """Check that a folder that is to be written has no content; what a killed process left in it is empty.
+    """Check that a folder that is to be written has no content; a killed process left empty or partial files.
 
     Raises:
         JournalError: if it has any, which users may have changed, or cannot be a folder.
     """
     with can_be_a_folder(directory):
         for path in directory.iterdir() if directory.exists() else ():
-            if next(path.iterdir(), None) if path.is_dir() else path.lstat().st_size:
+            full = next(path.iterdir(), None) if path.is_dir() else path.lstat().st_size
+            if full and path.suffix != ".partial":  # of write_whole
                 other = f"choose another {written('--out', 'directory')}, new or empty"
                 raise JournalError(f"{directory} has files, which are kept: {other}")
 

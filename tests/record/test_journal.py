@@ -84,6 +84,13 @@ def test_what_a_killed_run_has_left_half_written_is_removed_when_it_is_resumed(t
     assert all(path.exists() for path in others)
 
 
+def test_a_run_that_was_killed_before_its_manifest_was_complete_is_begun_again(tmp_path: Path) -> None:
+    (tmp_path / f"manifest.json.{2**22 + 7}.partial").write_text("{")
+    (tmp_path / "lock").touch()
+    falsify(impossible(), "uniform", budget=1, directory=tmp_path)
+    assert not list(tmp_path.glob("*.partial"))
+
+
 @pytest.mark.parametrize("damage", ["changed", "missing"])
 def test_a_trajectory_that_is_damaged_is_told_once(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, damage: str
