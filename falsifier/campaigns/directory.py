@@ -56,8 +56,7 @@ def run_directory(directory: Path, name: str) -> Path:
 def run_directories(directory: Path) -> list[Path]:
     """Directories of all runs that have started, in the campaign's order.
 
-    For a run directory, itself. For a folder that is neither but contains run directories, those, and those
-    of specs whose requirements are searched in groups, which are a folder deeper.
+    For a run directory, itself. For a folder that is neither but contains run directories, those.
 
     Raises:
         JournalError: if the directory contains neither a campaign nor a run.

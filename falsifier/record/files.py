@@ -33,9 +33,6 @@ TRAJECTORY_NAMES = r"\d+-[0-9a-f]+\.npz"
 # Errors of the operating system that say that a path can never be a folder.
 _NO_FOLDER = frozenset({errno.EEXIST, errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP})
 
-# How often to look whether a lock is free, in s.
-_LOCK_PERIOD = 0.05
-
 Content = TypeVar("Content", bound=BaseModel)
 
 
@@ -78,7 +75,7 @@ def locked(path: Path, *, busy: str, patience: float = 0.0) -> Iterator[None]:
     while (held := lock_file(path, 0o666)) is None:
         if monotonic() > until:
             raise JournalError(busy)
-        sleep(_LOCK_PERIOD)
+        sleep(0.05)
     try:
         yield
     finally:
