@@ -17,7 +17,7 @@ from falsifier.campaigns.request import CampaignRequest
 from falsifier.core.literals import shell_word
 from falsifier.errors import JournalError
 from falsifier.record.files import CAMPAIGN, is_locked, locked, make_folder, read_sealed, write_sealed
-from falsifier.record.journal import holds_run
+from falsifier.record.journal import holds_run, runs_below
 from falsifier.record.manifest import Surroundings
 
 _LOCK = "lock"
@@ -66,8 +66,7 @@ def run_directories(directory: Path) -> list[Path]:
         return [p for n in named if holds_run(p := run_directory(directory, n))]
     if holds_run(directory):
         return [directory]
-    below = sorted(path for path in directory.glob("*") if holds_run(path))
-    if below:
+    if below := runs_below(directory):
         return below
     if not directory.exists():
         raise JournalError(f"{directory}: no such directory; expected that of a run or campaign")

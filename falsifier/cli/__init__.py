@@ -187,8 +187,10 @@ def _report_refusal(error: OSError) -> int:
     if cure := remedy(error):
         warn(f"falsifier: {where}{error.strerror}{cure}")
     elif not where:
-        gone = "; if the current folder was deleted, change to another" if error.errno == errno.ENOENT else ""
-        warn(f"falsifier: {error}{gone}")
+        gone = "if the current folder was deleted, change to another"
+        if "temporary directory" in str(error):  # tempfile has tried all that it knows
+            gone = "set TMPDIR to a folder that can be written to"
+        warn(f"falsifier: {error}{f'; {gone}' if error.errno == errno.ENOENT else ''}")
     else:
         warn(f"falsifier: {where}{error.strerror}; choose a readable and writable location")
         return 2

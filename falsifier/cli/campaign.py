@@ -6,7 +6,6 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from datetime import datetime
 from itertools import product
 from pathlib import Path
 from typing import Any, NoReturn
@@ -22,6 +21,7 @@ from falsifier.campaigns.runner import check_request
 from falsifier.campaigns.tables import TABLES, statistics_json
 from falsifier.cli import llm_options, options
 from falsifier.cli.command import command, refuse
+from falsifier.cli.files import new_directory
 from falsifier.cli.output import FAILED, conclude, say
 from falsifier.core.files import write_whole
 from falsifier.core.literals import shell_word
@@ -131,7 +131,7 @@ def bench(
     )
     if table != "main" and not llms:
         raise click.UsageError(f"--table {table}: shows language models; name one with --llm, or drop it")
-    directory = out or Path("runs") / f"bench-{datetime.now():%Y%m%d-%H%M%S}"
+    directory = out or new_directory("bench")
     check_new(directory)
     check_request(request)
     warn(f"{counted(len(request.runs), 'run')} in {directory}")

@@ -1,10 +1,15 @@
 """Files written by several commands: where they may be written, and pictures."""
 
 from collections.abc import Callable
+from contextlib import suppress
+from datetime import datetime
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from falsifier.core.files import write_whole
+import click
+
+from falsifier.core.files import file_name, write_whole
 from falsifier.core.literals import one_line
 from falsifier.errors import FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation
@@ -41,6 +46,27 @@ def made_folder(directory: Path) -> None:
     """Make a folder to write to; JournalError if it has files."""
     check_unused(directory)
     make_folder(directory)
+
+
+def new_directory(name: str) -> Path:
+    """Make a folder in ``runs/``, named by the time, which goes with the command if it is empty.
+
+    Tasks of a job array start at the same moment: only who has made a folder knows that it is nobody else's.
+    """
+    base = Path("runs") / f"{file_name(name)}-{datetime.now():%Y%m%d-%H%M%S}"
+    make_folder(base.parent)
+    for place in chain([base], (base.with_name(f"{base.name}-{i}") for i in count(2))):
+        with suppress(FileExistsError):
+            place.mkdir()
+            break
+
+    def tidy() -> None:
+        with suppress(OSError):
+            place.rmdir()
+            place.parent.rmdir()
+
+    click.get_current_context().call_on_close(tidy)
+    return place
 
 
 def checked_picture(path: Path) -> Path:

@@ -22,8 +22,8 @@ from falsifier.views.plotting import plot_coverage
 from falsifier.views.report import html_report, markdown_report
 from falsifier.views.terminal import warn
 
-# How a file in the ARCH-COMP validation format begins.
-_ARCH_COMP = b"system,"
+# How a file in the ARCH-COMP validation format begins, and a table of evaluations.
+_ARCH_COMP, _EVALUATIONS = b"system,", b"directory,requirement,"
 
 
 @command()
@@ -57,7 +57,7 @@ def report(
         refuse("takes one DIRECTORY", arch_comp=arch_comp)
     path = out or (None if markdown else first / "report.html")
     page, kind = (b"# Falsification report: ", ".md") if markdown else (b"<!DOCTYPE html>", ".html")
-    outputs = ((arch_comp, _ARCH_COMP, ".csv"), (csv_file, b"requirement,", ".csv"), (path, page, kind))
+    outputs = ((arch_comp, _ARCH_COMP, ".csv"), (csv_file, _EVALUATIONS, ".csv"), (path, page, kind))
     named = [(file, begins, ending) for file, begins, ending in outputs if file is not None]
     if len({file.resolve() for file, _, _ in named}) < len(named):
         raise click.UsageError("--out, --csv and --arch-comp: expected a file for each, got one for two")

@@ -1,7 +1,6 @@
 """``falsifier run`` and ``falsifier resume``."""
 
 from collections.abc import Sequence
-from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -12,7 +11,6 @@ from falsifier.cli import options
 from falsifier.cli.command import Command, command, refuse
 from falsifier.cli.llm_options import check_context, context_option, llm_options, llm_settings, read_budget
 from falsifier.cli.output import as_shown, conclude
-from falsifier.core.files import file_name
 from falsifier.errors import JournalError
 from falsifier.views.terminal import warn
 
@@ -82,7 +80,7 @@ def run(
     The first limit that is reached ends the run. Exit codes: 0 not falsified, 1 falsified, 2 wrong usage or
     spec, 3 simulator, language model or machine failed, 130 interrupted.
     """
-    from falsifier.cli.files import check_out, in_existing_folder
+    from falsifier.cli.files import check_out, in_existing_folder, new_directory
     from falsifier.problem.loading import load_source
     from falsifier.record.run import falsify
     from falsifier.views.progress import log_fmu, make_display
@@ -111,7 +109,7 @@ def run(
             seed=seed,
             budget=budget,
             jobs=jobs,
-            directory=out or _new_directory(source.name),
+            directory=out or new_directory(source.name),
             start_from=start_from,
             listeners=[display, *logs],
         )
@@ -223,10 +221,3 @@ def _sources(source: "ProblemSource") -> "tuple[ProblemSource, ...]":
     several = sources_of(source)
     named = [each for each in several if each.name == find_spec(source.target)[0].stem]
     return (source,) if len(several) == 1 or named else tuple(several)
-
-
-def _new_directory(name: str) -> Path:
-    base = Path("runs") / f"{file_name(name)}-{datetime.now():%Y%m%d-%H%M%S}"
-    return next(
-        p for p in (base, *(base.with_name(f"{base.name}-{i}") for i in range(2, 1000))) if not p.exists()
-    )

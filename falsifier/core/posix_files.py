@@ -11,6 +11,8 @@ import tempfile
 from io import FileIO
 from pathlib import Path
 
+from falsifier.errors import MachineError
+
 
 def unnamed_file(*, may_be_sealed: bool = False) -> FileIO:
     """Open a file without a name, in memory if the system supports that.
@@ -48,18 +50,25 @@ def sealed_file(size: int) -> FileIO:
     return file
 
 
-def lock_file(path: Path) -> int | None:
+def lock_file(path: Path, mode: int = 0o600) -> int | None:
     """Create and lock a file; the lock ends with the last process that has the returned descriptor open.
 
     Returns:
         The descriptor; None if another process has locked the file.
+
+    Raises:
+        MachineError: if the file system has no locks, as Lustre has none unless it is mounted with them.
     """
-    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, 0o600)
+    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW, mode)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
+    except OSError as error:
         os.close(descriptor)
-        return None
+        if isinstance(error, BlockingIOError):
+            return None
+        raise MachineError(
+            f"{path} cannot be locked ({error.strerror}): choose a folder on a file system that has locks"
+        ) from None
     return descriptor
 
 

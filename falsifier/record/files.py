@@ -3,6 +3,7 @@
 import errno
 import fcntl
 import logging
+import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,13 +11,14 @@ from functools import cache
 from io import BytesIO
 from itertools import count
 from pathlib import Path
+from time import monotonic, sleep
 from typing import TypeVar
 
-from filelock import FileLock, Timeout
 from pydantic import BaseModel, ValidationError
 
 from falsifier.core.files import check_seal, checksum, seal, write_whole
 from falsifier.core.literals import one_line, shell_word
+from falsifier.core.posix_files import lock_file
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import JournalError, first_fault, written
 
@@ -67,13 +69,17 @@ def locked(path: Path, *, busy: str, patience: float = 0.0) -> Iterator[None]:
 
     Raises:
         JournalError: if another process still holds it after that time.
+        MachineError: if the file system has no locks.
     """
+    until = monotonic() + patience
+    while (held := lock_file(path, 0o666)) is None:
+        if monotonic() > until:
+            raise JournalError(busy)
+        sleep(0.05)
     try:
-        held = FileLock(path).acquire(timeout=patience)
-    except Timeout:
-        raise JournalError(busy) from None
-    with held:
         yield
+    finally:
+        os.close(held)
 
 
 def is_locked(path: Path) -> bool:
@@ -81,8 +87,8 @@ def is_locked(path: Path) -> bool:
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError:
-        return True
+    except OSError as error:  # else its file system has no locks, so that nobody writes there
+        return isinstance(error, BlockingIOError)
     return False
 
 
@@ -154,14 +160,15 @@ def make_folder(directory: Path) -> None:
 
 
 def check_unused(directory: Path) -> None:
-    """Check that a folder that is to be written has no content; what a killed process left in it is empty.
+    """Check that a folder that is to be written has no content; a killed process left empty or partial files.
 
     Raises:
         JournalError: if it has any, which users may have changed, or cannot be a folder.
     """
     with can_be_a_folder(directory):
         for path in directory.iterdir() if directory.exists() else ():
-            if next(path.iterdir(), None) if path.is_dir() else path.lstat().st_size:
+            full = next(path.iterdir(), None) if path.is_dir() else path.lstat().st_size
+            if full and path.suffix != ".partial":  # of write_whole
                 other = f"choose another {written('--out', 'directory')}, new or empty"
                 raise JournalError(f"{directory} has files, which are kept: {other}")
 

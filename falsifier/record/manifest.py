@@ -157,7 +157,7 @@ def read(directory: Path) -> Manifest:
 
 def check_no_folder(directory: Path) -> None:
     """Refuse a folder of runs, or a campaign's, where a run is expected; JournalError naming some of them."""
-    found = (path for pattern in ("*", "runs/*") for path in directory.glob(f"{pattern}/{MANIFEST}"))
+    found = (path for pattern in ("*", "*/*") for path in directory.glob(f"{pattern}/{MANIFEST}"))
     below = sorted(str(path.parent) for path in found)
     if below and not (directory / MANIFEST).exists():
         raise JournalError(f"{directory} is a folder of runs; give one of them: {first_few(below, _NAMED)}")

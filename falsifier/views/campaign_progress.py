@@ -6,6 +6,7 @@ from time import monotonic
 
 from falsifier.campaigns import Progress
 from falsifier.core.words import counted
+from falsifier.search.budget import Spent
 from falsifier.views.terminal import error_console, line_writer, live_line, unbroken
 
 Show = Callable[[Progress], None]
@@ -34,19 +35,22 @@ class Scoreboard:
 
     def __init__(self, write: Write, update: Write | None = None) -> None:
         self._write, self._update = write, update
-        self._ended: dict[str, str] | None = None
+        # What runs had spent when they ended, and which have ended for good or since the start.
+        self._ended: dict[str, Spent] | None = None
+        self._done: set[str] = set()
         self._written, self._overall = 0.0, ""
 
     def __call__(self, progress: Progress) -> None:
         """Write a line per run that ended since the last call."""
-        ended = {r.name: str(r.status) for r in progress.runs if r.status not in ("waiting", "running")}
-        if self._ended is None:  # runs that ended before this start get no line
-            self._ended = ended
+        ended = {r.name: r.spent for r in progress.runs if r.status not in ("waiting", "running")}
+        if self._ended is None:  # runs that ended before this start get no line, but those that are repeated
+            self._ended, self._done = ended, {r.name for r in progress.runs if r.finished}
             self._write(f"{counted(len(progress.runs), 'run')}, {progress.finished} already finished")
         for run in progress.runs:
-            if run.name in ended and self._ended.get(run.name) != run.status:
-                self._ended[run.name] = run.status
-                self._write(f"[{len(self._ended)}/{len(progress.runs)}] {run}")
+            if run.name in ended and self._ended.get(run.name) != run.spent:
+                self._ended[run.name] = run.spent
+                self._done.add(run.name)
+                self._write(f"[{len(self._done)}/{len(progress.runs)}] {run}")
         line = overall_line(progress)
         if self._update is not None:
             self._update(line)

@@ -10,8 +10,11 @@ from falsifier.campaigns.directory import (
     run_directory,
     write_campaign,
 )
+from falsifier.campaigns.runs import load
 from falsifier.errors import JournalError
-from falsifier.record.run import falsify
+from falsifier.record.run import falsify, resume
+from falsifier.testing import lag_problem
+from falsifier.views.report.watch import Watch
 from tests.problems import impossible
 
 
@@ -34,6 +37,19 @@ def test_a_run_is_its_own_only_one_and_a_folder_has_those_in_it(tmp_path: Path) 
     assert run_directories(tmp_path) == [tmp_path / "a", tmp_path / "b"]
     with pytest.raises(JournalError, match="notes"):
         run_directories(tmp_path / "notes")
+
+
+def test_runs_of_a_spec_that_is_searched_in_groups_are_found_a_folder_deeper(tmp_path: Path) -> None:
+    problems = [impossible(), lag_problem("G[0,5] (x <= 50)", points=2, name="APART")]
+    for seed in (1, 0):
+        falsify(problems, "uniform", budget=1, seed=seed, directory=tmp_path / f"{seed}")
+    falsify(impossible(), "uniform", budget=1, directory=tmp_path / "one")
+    names = ["0/APART", "0/NEVER", "1/APART", "1/NEVER", "one"]
+    assert run_directories(tmp_path) == [tmp_path / name for name in names]
+    assert [run.requirement for run in load(tmp_path)] == ["APART", "NEVER", "APART", "NEVER", "NEVER"]
+    assert len(resume(tmp_path, problems=problems, budget=2)) == len(names)
+    page, _ = Watch(tmp_path).look("1/NEVER")
+    assert "1/NEVER: not running." in page and all(f"?run={name}" in page for name in names)
 
 
 def test_a_lock_that_may_only_be_read_is_looked_at(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,11 +4,16 @@ import shutil
 import signal
 import subprocess
 import sys
+from datetime import datetime
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
+import click
 import pytest
 
+from falsifier.cli import cli
+from falsifier.cli.files import new_directory
 from falsifier.core.files import bundled
 from falsifier.errors import JournalError
 from falsifier.record.journal import read_journal
@@ -38,6 +43,18 @@ def test_at1_is_falsified_from_the_bundled_fmu(tmp_path: Path) -> None:
 
 
 SPEED = ("my.fmu", "--stl", "G[0,20] (speed <= 120)")
+
+
+def test_tasks_that_start_at_the_same_moment_have_a_directory_each(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("falsifier.cli.files.datetime", Mock(now=lambda: datetime(2026, 1, 2)))
+    with click.Context(cli):
+        places = [new_directory("AT1") for _ in range(3)]
+        assert [p.name for p in places] == [f"AT1-20260102-000000{end}" for end in ("", "-2", "-3")]
+        (places[1] / "manifest.json").touch()
+    assert list(Path("runs").iterdir()) == [places[1]]
 
 
 @pytest.mark.parametrize(

@@ -81,6 +81,12 @@ def test_simulations_need_no_streams_and_take_any_tmpdir(shell: str, tmpdir: str
     assert run(tmp_path, shell=shell, TMPDIR=tmpdir)[0] == 0
 
 
+def test_where_no_temporary_file_can_be_written_another_folder_is_asked_for(tmp_path: Path) -> None:
+    """As in a container whose files may only be read."""
+    code, said = run(tmp_path, ["simulate", "AT1"], before=limited(resource.RLIMIT_FSIZE, 0))
+    assert (code, said.endswith("; set TMPDIR to a folder that can be written to\n")) == (3, True)
+
+
 def test_a_current_folder_that_was_deleted_is_told(tmp_path: Path) -> None:
     (tmp_path / "gone").mkdir()
     code, said = run(tmp_path / "gone", ["run", "AT1"], before=(tmp_path / "gone").rmdir)

@@ -1,13 +1,15 @@
 """Reading and writing the record of a run."""
 
+import errno
+import os
 from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
 
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, MachineError
 from falsifier.record import journal
-from falsifier.record.files import recorded_trajectory, set_aside
+from falsifier.record.files import is_locked, recorded_trajectory, set_aside
 from falsifier.record.records import line_of
 from falsifier.record.run import falsify
 from falsifier.search.result import Result
@@ -48,6 +50,26 @@ def test_one_writer_per_directory(tmp_path: Path) -> None:
         pass
 
 
+@pytest.mark.parametrize("code", [errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP])
+def test_where_there_are_no_locks_nobody_writes(
+    code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As on Lustre, which clusters share: two that write to one run would damage it."""
+
+    def refuse(*_: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    with journal.open_journal(tmp_path):
+        assert is_locked(tmp_path / "lock")
+    monkeypatch.setattr("fcntl.flock", refuse)
+    without = pytest.raises(
+        MachineError, match=r"lock cannot be locked \(.+\): choose a folder on a file system"
+    )
+    with without, journal.open_journal(tmp_path):
+        pass
+    assert not is_locked(tmp_path / "lock")
+
+
 def test_what_a_killed_run_has_left_half_written_is_removed_when_it_is_resumed(tmp_path: Path) -> None:
     dead = 2**22 + 7
     folder = tmp_path / "trajectories"
@@ -60,6 +82,13 @@ def test_what_a_killed_run_has_left_half_written_is_removed_when_it_is_resumed(t
         pass
     assert not any(path.exists() for path in left)
     assert all(path.exists() for path in others)
+
+
+def test_a_run_that_was_killed_before_its_manifest_was_complete_is_begun_again(tmp_path: Path) -> None:
+    (tmp_path / f"manifest.json.{2**22 + 7}.partial").write_text("{")
+    (tmp_path / "lock").touch()
+    falsify(impossible(), "uniform", budget=1, directory=tmp_path)
+    assert not list(tmp_path.glob("*.partial"))
 
 
 @pytest.mark.parametrize("damage", ["changed", "missing"])

@@ -38,6 +38,19 @@ def test_plain_lines_say_each_end_once() -> None:
     ]
 
 
+def test_runs_that_are_repeated_say_how_they_end_though_as_before() -> None:
+    lines: list[str] = []
+    board = Scoreboard(lines.append)
+    before = (run("A", 0, "falsified", 7, -0.5), run("A", 1, "failed", 1), run("B", 0, "interrupted", 1))
+    after = (before[0], run("A", 1, "failed", 2), run("B", 0, "falsified", 3, -0.1))
+    for runs in (before, before, after, after):
+        board(Progress(runs))
+    assert lines[2:] == [
+        "[2/3] A uniform seed 1: failed after 2 simulations: ",
+        "[3/3] B uniform seed 0: falsified after 3 simulations, best robustness -0.1",
+    ]
+
+
 def test_the_overall_line_counts_everything() -> None:
     assert overall_line(AFTER) == (
         "1/3 runs finished, 1 falsified, 1 failed, 1 running, 10 simulations, 300 tokens, 0.7500 US dollars"

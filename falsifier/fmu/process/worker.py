@@ -23,6 +23,8 @@ from falsifier.fmu.process.workplace import Workplace
 
 # A process that could not send its reply ends with this code (main.c); one that is going to end does so soon.
 _CUT_OFF, _ENDING_SECONDS = 74, 0.2
+# A process that may start no other one, or open no more files, ends with this code (guard.c).
+_CANNOT_START, _LIMITED = 71, "; end other processes, or raise the limits (ulimit -u, ulimit -n)"
 # Wine on a busy machine.
 _STARTING_SECONDS = 120.0
 
@@ -132,9 +134,10 @@ class Worker(Started):
             self.receive(_STARTING_SECONDS)
         except (ConnectionError, TimeoutError) as error:
             needed = f"; a Wine for 64-bit programs is needed: {HOW_TO_INSTALL}"
-            hint = needed if self._order.through_wine else ""
-            end = exit_text(self.end())
-            raise ModelError(f"the program that runs FMUs does not start ({end}){hint}") from error
+            code = self.end()
+            hint = needed if self._order.through_wine else _LIMITED if code == _CANNOT_START else ""
+            why = f"the program that runs FMUs does not start ({exit_text(code)}){hint}"
+            raise ModelError(why) from error
         # The worker tells there which component it loads.
         self.memory.fit(HEADER)
         send(self.program, Request.LOAD, self._load)

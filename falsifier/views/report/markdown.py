@@ -90,6 +90,10 @@ def _listed(title: str, lines: Iterable[str]) -> list[str]:
 def _environment(side: Side) -> str:
     if not side.runs:
         return "No run has started yet."
-    manifest = side.runs[0].manifest
-    packages = ", ".join(f"{name} {version}" for name, version in manifest.packages.items())
-    return f"falsifier {manifest.falsifier}, Python {manifest.python}, {manifest.platform}, {packages}."
+    told: dict[str, None] = {}  # runs of several machines may differ
+    for manifest in (run.manifest for run in side.runs):
+        packages = ", ".join(f"{name} {version}" for name, version in manifest.packages.items())
+        told[f"falsifier {manifest.falsifier}, Python {manifest.python}, {manifest.platform}, {packages}"] = (
+            None
+        )
+    return f"{'; '.join(told)}."

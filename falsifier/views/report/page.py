@@ -264,13 +264,15 @@ def _table(shown: Table) -> Html:
 
 
 def _environment(side: Side) -> Html:
-    facts: dict[str, str] = {}
+    facts: dict[str, dict[str, None]] = {}  # runs of several machines may differ
     for manifest in (run.manifest for run in side.runs):
-        facts |= {
+        for name, value in {
             "falsifier": manifest.falsifier,
             "Python": manifest.python,
             "platform": manifest.platform,
             **manifest.packages,
             **{path: f"SHA-256 {digest}" for path, digest in manifest.hashes.items()},
-        }
-    return el("details", el("summary", f"Versions and files: {side.title}"), facts_html(facts.items()))
+        }.items():
+            facts.setdefault(name, {})[value] = None
+    told = ((name, "; ".join(values)) for name, values in facts.items())
+    return el("details", el("summary", f"Versions and files: {side.title}"), facts_html(told))

@@ -106,7 +106,9 @@ class Watch:
 
         Without the name of the folder of a run, the first that is running is shown.
         """
-        places = {place.name: place for place in run_directories(self.directory)}
+        found = run_directories(self.directory)
+        is_one = self._follower is not None or found == [self.directory]
+        places = {str(p.relative_to(p.parent if is_one else self.directory)): p for p in found}
         parts, rows = [], list[RunProgress]()
         working = is_worked_on(self.directory)
         if self._follower is not None:

@@ -104,6 +104,21 @@ class TestElsewhere:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells it")
+def test_a_program_that_may_start_no_other_one_says_which_limits_to_raise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As under ``ulimit -u``, which binds no administrator."""
+    program = tmp_path / "worker"
+    program.write_text("#!/bin/sh\nexit 71\n")
+    program.chmod(0o700)
+    monkeypatch.setattr(workplace.Workplace, "program", lambda *_, **__: program)
+    REGISTRY.close()
+    with pytest.raises(
+        ModelError, match=r"code 71\); end other processes, or raise the limits \(ulimit -u, "
+    ):
+        fixtures.run(fixtures.isolated("Lag_2"), ("y",))
+
+
 def test_a_folder_that_forbids_programs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     known = os.statvfs(tempfile.gettempdir())
     forbidding = os.statvfs_result([*known[:8], os.ST_NOEXEC, *known[9:]])

@@ -11,6 +11,7 @@ from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.shorthand import changes_from, changes_from_options
 from falsifier.problem.source import ProblemSource
+from falsifier.record import manifest
 from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.request import LLMSettings, RunRequest
@@ -42,6 +43,16 @@ def test_runs_of_the_same_name_are_told_apart_by_their_folders(tmp_path: Path) -
     for place in places:
         assert f"## HARD in {place}: violated" in text
         assert f"{place}: falsifier " in text, "its versions"
+
+
+def test_versions_of_all_machines_are_told(tmp_path: Path) -> None:
+    for name in ("a", "b", "c"):
+        falsify(hard(), "uniform", budget=1, directory=tmp_path / name)
+    known = manifest.read(tmp_path / "b")
+    manifest.write(tmp_path / "b", known.model_copy(update={"platform": "Node-7"}))
+    last = markdown_report(tmp_path).replace("\\", "").splitlines()[-1]
+    assert [last.count(of) for of in (known.platform, "Node-7", "; falsifier ")] == [1, 1, 1]
+    assert f"<dd>{known.platform}; Node-7</dd>" in html_report(tmp_path)
 
 
 def test_real_inputs_are_drawn_as_they_were_and_not_as_whole_numbers(tmp_path: Path) -> None:
