@@ -233,7 +233,8 @@ class Problem:
             self.experiment,
             sorted(self.parameters.items()),
         )
-        return sha256(repr(content).encode()).hexdigest()
+        # Without what is usual: runs that were recorded before there was a choice can be continued.
+        return sha256(repr(content).replace(", scale='linear'", "").encode()).hexdigest()
 
 
 def _held_because(variable: Variable, info: ModelInfo, *, is_given: bool) -> str:
