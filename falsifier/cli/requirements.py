@@ -64,7 +64,7 @@ def check(*, budget: int, as_json: bool, **given: Any) -> None:
 
 def _problem_line(problem: Problem) -> str:
     space = problem.space
-    shown = {r.name: f"{r.name} [{readable(r.low)}, {readable(r.high)}]" for r in space.ranges}
+    shown = {r.name: f"{r.name} [{readable(r.low)}, {readable(r.high)}]{r.manner}" for r in space.ranges}
     searched = [f"{shown[r.name]} {parameterization_text(r)}" for r in space.inputs]
     searched += [shown[p.name] for p in space.parameters]
     return f"{problem.name}: ok, {problem.requirement.formula}; searches {', '.join(searched)}"

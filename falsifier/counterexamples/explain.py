@@ -137,8 +137,10 @@ class Explanation:
         if effect.is_rest:
             return f"{'at rest' if isinstance(ranged, InputRange) else 'at its nominal value'} ({number})"
         is_between = ranged.low < effect.instead < ranged.high
-        middle = "at" if effect.instead == (ranged.low + ranged.high) / 2 else "near"
-        return f"{f'{middle} the middle of its range' if is_between else 'at an end of its range'} ({number})"
+        middle = (
+            f"{'at' if effect.instead == ranged.at(0.5) else 'near'} the middle of its range{ranged.manner}"
+        )
+        return f"{middle if is_between else 'at an end of its range'} ({number})"
 
 
 def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
@@ -184,7 +186,7 @@ def _reset(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[
     rest = rest_value(problem, ranged)
     if rest is not None and any(v != rest for v in values):
         return Effect(ranged.name, None, rest, is_rest=True)
-    middle = (ranged.low + ranged.high) / 2
+    middle = ranged.at(0.5)
     # Of two that are equally near, such as those of a Boolean, the other one.
     aside = 0.0 if ranged.kind == "real" else 0.25 if values[0] < middle else -0.25
     return Effect(ranged.name, None, nearest_value(ranged, middle + aside), is_rest=False)
