@@ -330,9 +330,11 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
             if isinstance(text := section.value, str) and variable.kind != "string":
                 number = number_in(text) if variable.number_of(text) is None else None
                 stated["value"] = text if number is None else number
+            if variable.causality == "input" and "scale" in stated:
+                raise SpecError("is an input: only parameters can have a scale; leave it out")
             if variable.causality == "input":
                 inputs[name] = InputSection.model_validate(stated)
-            elif not stated.keys() <= {"range", "value"}:
+            elif not stated.keys() <= {"range", "value", "scale"}:
                 value_kind(variable)
                 raise SpecError(f"is no input: {searching(kind, name)} searches it, without control points")
             else:

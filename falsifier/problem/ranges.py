@@ -134,6 +134,7 @@ def _parameter_range(variable: Variable, section: ParameterSection) -> Parameter
         description=variable.description,
         kind=kind,
         items=variable.items,
+        scale=section.scale or "linear",
     )
 
 

@@ -27,6 +27,9 @@ def test_check_says_what_is_searched(tmp_path: Path) -> None:
     assert repeated.out.count(": ok") == 10
     done = falsifier("check", "CC1", cwd=tmp_path, code=0)
     assert done.out.startswith("CC1: ok, ") and done.out.endswith("nothing found\n")
+    drive = '[parameters.finalDrive]\nrange = [3, 3.5]\nscale = "log"\n'
+    done = falsifier("check", spec(tmp_path, WIDE + drive), cwd=tmp_path)
+    assert "finalDrive [3, 3.5] in decades" in done.out
 
 
 GOOD = {

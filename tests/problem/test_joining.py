@@ -56,6 +56,25 @@ def test_what_the_spec_says_is_completed_from_the_fmu() -> None:
     assert (found.requirement.name, found.requirement.description) == ("R", "slow")
 
 
+def test_a_parameter_may_be_searched_in_decades_and_nothing_else() -> None:
+    def searched(**options: Any) -> list[tuple[str, float, str]]:
+        found = joined(options=options).space.parameters
+        return [(p.name, p.low, p.scale) for p in found]
+
+    assert searched(ranges=["finalDrive=3:3.5:log"]) == [("finalDrive", 3.0, "log")]
+    assert searched() == [("finalDrive", 3.0, "linear")]
+    scaled = copy.deepcopy(SPEC)
+    scaled["parameters"]["finalDrive"] = {"range": [3.0, 3.5], "scale": "log"}
+    narrower = changes_from(parameters={"finalDrive": (3.1, 3.2)})
+    (p,) = join(parse_spec(scaled, file="my.toml"), "R", path=FILE, changes=narrower).space.parameters
+    assert (p.low, p.scale) == (3.1, "log")
+    with pytest.raises(SpecError, match="throttle: is an input: only parameters can have a scale"):
+        joined(options={"ranges": ["throttle=1:100:log"]})
+    scaled["parameters"] = {"rollingLoad": {"range": [0, 40], "scale": "log"}}
+    with pytest.raises(SpecError, match=r'parameters\.rollingLoad: .*scale "log" needs low > 0'):
+        join(parse_spec(scaled, file="my.toml"), "R", path=FILE)
+
+
 def test_requirement_then_profile_then_option_override_the_spec() -> None:
     narrowed = joined("S")
     assert (narrowed.space.inputs[0].high, narrowed.experiment.stop_time) == (50.0, 30.0)
