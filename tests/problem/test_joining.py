@@ -183,6 +183,16 @@ def test_a_range_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> N
         assert [n.partition(", not")[0] for n in found if "outside" in n] == told
 
 
+def test_a_value_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> None:
+    old, new = b'unit="m" start="1.0"', b'unit="K" displayUnit="degC" start="293.15"'
+    ball = altered(fixture("Ball_2"), tmp_path / "ball.fmu", lambda text: text.replace(old, new))
+    note = "h: 20 degC would be nearer to its start value, 293.15 K; all numbers are in K, not in degC"
+    for value, told in ((300, []), (350, []), (20, [note])):
+        changes = changes_from(parameters={"h": value})
+        found = join_formula(ball, RequirementSection(formula="G (h <= 9)"), changes=changes, searches=False)
+        assert [n.partition(", in which")[0] for n in found.notes if "degC" in n] == told
+
+
 def test_inputs_that_need_only_be_named_are_told() -> None:
     spec = {key: SPEC[key] for key in ("model", "requirements")}
     with pytest.raises(SpecError, match="throttle and brake would be searched between min and max if"):
