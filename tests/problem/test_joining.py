@@ -2,6 +2,7 @@
 
 import copy
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -191,6 +192,18 @@ def test_a_value_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> N
         changes = changes_from(parameters={"h": value})
         found = join_formula(ball, RequirementSection(formula="G (h <= 9)"), changes=changes, searches=False)
         assert [n.partition(", in which")[0] for n in found.notes if "degC" in n] == told
+
+
+def test_a_start_value_outside_of_the_model_s_own_limits_can_be_stated_again() -> None:
+    h = Variable("h", causality="parameter", low=2.0, high=5.0, start=1.0, settable=True)
+    for value in (1.0, 1.5):
+        given = changes_from(parameters={"h": value})
+        space = partial(search_space, {}, given.parameters, ModelInfo("M", variables=(h,)), 1.0, given)
+        if value == h.start:
+            assert space()[1] == {"h": 1.0}
+        else:
+            with pytest.raises(SpecError, match=r"1\.5 exceeds the model's limits for 'h', \[2, 5\]"):
+                space()
 
 
 def test_inputs_that_need_only_be_named_are_told() -> None:
