@@ -12,7 +12,7 @@ from math import inf
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange, nearest_value
-from falsifier.core.words import in_unit, readable
+from falsifier.core.words import in_unit, named, readable
 from falsifier.counterexamples.shrink import (
     constant_signal,
     sampled_stretches,
@@ -132,8 +132,8 @@ class Explanation:
 
     def _instead(self, effect: Effect) -> str:
         unit = next((v.unit for v in self.problem.info.variables if v.name == effect.name), "")
-        number = in_unit(readable(effect.instead, 4), unit)
         ranged = next(r for r in self.problem.space.ranges if r.name == effect.name)
+        number = in_unit(named(readable(effect.instead, 4), ranged.kind, ranged.items), unit)
         if effect.is_rest:
             return f"{'at rest' if isinstance(ranged, InputRange) else 'at its nominal value'} ({number})"
         is_between = ranged.low < effect.instead < ranged.high

@@ -85,6 +85,10 @@ def test_what_is_at_rest_is_put_to_the_middle_of_its_range() -> None:
         whole = lag_problem(parameters=(ParameterRange("x0", 0.0, high, kind="integer", nominal=0.0),))
         found = explain(whole, evaluate(whole, whole.space.decode([1.0] * 4 + [0.0])))
         assert f"With x0 {told.replace(' (', ' of its range (')} alone" in found.text
+    mode = ParameterRange("x0", 0, 2, kind="enumeration", items=(("off", 0), ("on", 2)), nominal=0.0)
+    named = lag_problem(parameters=(mode,))
+    found = explain(named, evaluate(named, named.space.decode([1.0] * 4 + [0.0])))
+    assert "With x0 at an end of its range (2 = on) alone" in found.text
 
 
 def test_what_resetting_would_not_change_is_left_out() -> None:
