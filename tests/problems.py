@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from falsifier.core.space import ParameterRange, Scale
 from falsifier.problem.problem import Problem
 from falsifier.testing import Array, lag, lag_problem
 from tests.patience import wait_until
@@ -52,6 +53,19 @@ def mostly_broken(times: Array, inputs: Columns, parameters: dict[str, float]) -
 def straight(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
     """Give the parameter ``bias`` itself: what can be reached, and how probably, is known."""
     return {"x": np.full(times.shape, parameters["bias"])}
+
+
+def exponent(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+    """Give the decimal logarithm of the parameter ``bias``."""
+    return {"x": np.full(times.shape, np.log10(parameters["bias"]))}
+
+
+def decades(
+    formula: str = "G[0,10] (x <= -5 or x >= -4.52)", *, inputs: int = 0, scale: Scale = "log"
+) -> Problem:
+    """Falsified where ``bias``, from 1e-7 to 1, is between 1e-5 and 3e-5; its exponent is x."""
+    bias = ParameterRange("bias", 1e-7, 1.0, scale=scale)
+    return lag_problem(formula, inputs=inputs, parameters=[bias], response=exponent, name="DECADES")
 
 
 def still(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:

@@ -55,7 +55,7 @@ _KEYS: Mapping[str, Mapping[str, tuple[str, str]]] = {
         "failures": ("list", "causes of failed simulations, with how often each occurred"),
         "not_searched": (
             "list",
-            "inputs and parameters that keep a value: `name`, `causality`, `value`, `reason`",
+            "what keeps a value: `name`, `causality`, `value`, the name of its `item`, `reason`",
         ),
         "fragile": ("list", "violations that are gone at half the step: evaluations with the `reason`"),
         "remarks": ("list", "what to know of how the engine worked, in words"),

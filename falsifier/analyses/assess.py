@@ -39,7 +39,7 @@ class Draws(Uniform):
         for r, group in zip(self.box.space.ranges, self.box.groups, strict=True):
             if r.kind != "real" and r.low < r.high:
                 drawn = np.array([r.numbers[int(share * len(r.numbers))] for share in point[group]])
-                point[group] = (drawn - r.low) / (r.high - r.low)
+                point[group] = r.share_of(drawn)
         return Proposal(point, "uniform random")
 
 
@@ -262,7 +262,7 @@ def _distribution_text(space: SearchSpace) -> str:
     """Describe what is drawn: each control point and parameter on its own."""
     parts = [
         *(_input_text(r, space) for r in space.inputs),
-        *(f"{p.name} uniform in {_range_text(p)}" for p in space.parameters),
+        *(f"{p.name} {'log-' * (p.scale == 'log')}uniform in {_range_text(p)}" for p in space.parameters),
         "all numbers independent of each other",
     ]
     if any(r.free is not None for r in space.inputs):

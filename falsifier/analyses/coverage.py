@@ -324,7 +324,8 @@ def edges_of(r: Range) -> list[tuple[float, float]]:
         return [(float(n), float(n)) for n in numbers]
     if r.low == r.high:
         return [(r.low, r.high)]
-    return list(pairwise(np.linspace(r.low, r.high, PARTS + 1).tolist()))
+    spaced = np.geomspace if r.scale == "log" else np.linspace
+    return list(pairwise(spaced(r.low, r.high, PARTS + 1).tolist()))
 
 
 def cells_of(r: Range, values: Array) -> Cells:

@@ -221,7 +221,8 @@ def _judged(subject: Subject, readings: Sequence[Reading]) -> list[Reading]:
 
     def start(searched: InputRange | ParameterRange) -> float:
         value, low, high = info[searched.name].start, searched.low, searched.high
-        return float(value) if isinstance(value, int | float) and low <= value <= high else (low + high) / 2
+        known = float(value) if isinstance(value, int | float) and low <= value <= high else None
+        return float(searched.at(0.5)) if known is None else known
 
     inputs = {r.name: start(r) for r in space.inputs}
     parameters = {p.name: start(p) for p in space.parameters}

@@ -9,6 +9,7 @@ import numpy as np
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed, readable
+from falsifier.engines.layout import fixed_layout
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.fmu import FmuModel
@@ -232,7 +233,8 @@ def _is_declared_independent(problem: Problem) -> bool:
 
 def _simulated(problem: Problem, simulations: int) -> list[Trajectory]:
     rng = np.random.default_rng(0)
-    low, high = problem.space.bounds.T
-    points = low + (high - low) * rng.random((simulations, len(low)))
-    found = (evaluate(problem, problem.space.decode(point)).trajectory for point in points)
+    box = fixed_layout(problem.space)
+    points = rng.random((simulations, box.dimension))
+    drawn = (box.candidate(point, origin="", rationale="") for point in points)
+    found = (evaluate(problem, candidate).trajectory for candidate in drawn)
     return [trajectory for trajectory in found if trajectory is not None]

@@ -192,7 +192,8 @@ def _shrink(
 
     def said(simpler: Evaluation, n: int) -> None:
         if not quiet:
-            warn(f"simulation {n}: {in_one_line(simpler.candidate)}; robustness {signed(simpler.robustness)}")
+            what = in_one_line(simpler.candidate, problem.space)
+            warn(f"simulation {n}: {what}; robustness {signed(simpler.robustness)}")
 
     with _loaded(case, rights) as problem:
         original = case.simulated(problem)

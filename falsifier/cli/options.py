@@ -149,8 +149,8 @@ def problem_options(command: Function, *, searches: bool = True) -> Function:
         "ranges",
         multiple=True,
         metavar="NAME=LOW:HIGH[:POINTS[:INTERPOLATION]]",
-        help="Input, parameter or start value to search. NAME alone: with the spec's range, or the FMU's min "
-        "and max. Repeatable.",
+        help="Input, parameter or start value to search. NAME=LOW:HIGH:log: a parameter in decades. NAME "
+        "alone: with the spec's range, or the FMU's min and max. Repeatable.",
     )
     return add(
         command,

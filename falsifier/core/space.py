@@ -6,8 +6,8 @@ between vectors and candidates.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import KW_ONLY, dataclass, replace
-from math import ceil, floor, inf, isfinite, prod
-from typing import Literal, get_args
+from math import ceil, floor, inf, isfinite, log, prod
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,7 @@ from falsifier.core.signals import INTERPOLATIONS, Interpolation, Signal, even_t
 from falsifier.errors import CandidateError, SpecError, did_you_mean
 
 ValueKind = Literal["real", "integer", "boolean", "enumeration"]
+Scale = Literal["linear", "log"]
 
 # Values outside their range by at most this share of it are clipped, others rejected: bounds that were
 # printed with six digits may come back rounded outwards.
@@ -63,6 +64,7 @@ class Range:
     description: str = ""
     kind: ValueKind = "real"
     items: tuple[tuple[str, int], ...] = ()
+    scale: Scale = "linear"
 
     def __post_init__(self) -> None:
         what = self.label
@@ -72,6 +74,15 @@ class Range:
         if not isfinite(high - low):
             raise SpecError(f"{what}: [{low:g}, {high:g}] is too wide to calculate with; narrow the range")
         one_of(f"{what}: kind", self.kind, get_args(ValueKind))
+        one_of(f"{what}: scale", self.scale, get_args(Scale))
+        if self.scale == "log":
+            if isinstance(self, InputRange) or self.kind != "real":
+                raise SpecError(f'{what}: only real parameters can have scale "log"; leave it out')
+            if low <= 0:
+                raise SpecError(
+                    f'{what}: scale "log" needs low > 0, got [{low:.12g}, {high:.12g}]; raise low, or leave '
+                    "scale out"
+                )
         if self.kind == "real":
             return
         if not (numbers := self.numbers):
@@ -86,6 +97,30 @@ class Range:
         """The integers in it that are allowed, in order."""
         items = sorted({n for _, n in self.items if self.low <= n <= self.high})
         return items if self.items else range(ceil(self.low), floor(self.high) + 1)
+
+    def at(self, share: Any) -> Any:
+        """Return the value at a share of the way from low to high, as the scale measures it.
+
+        Both are numbers or arrays of one shape. Engines search shares from 0 to 1: nothing else in them knows
+        about scales.
+
+        >>> ParameterRange("R", 1e-6, 1e-2, scale="log").at(0.25), ParameterRange("k", 2.0, 4.0).at(0.25)
+        (1e-05, 2.5)
+        """
+        if self.scale == "log":
+            return self.low ** (1.0 - share) * self.high**share  # exact at both ends
+        return self.low + (self.high - self.low) * share
+
+    def share_of(self, value: Any) -> Any:
+        """Return the share at which a value is, the inverse of ``at``; 0 if there is but one value."""
+        if self.scale == "log":
+            return (np.log(value) - log(self.low)) / ((log(self.high) - log(self.low)) or 1.0)
+        return (value - self.low) / ((self.high - self.low) or 1.0)
+
+    @property
+    def manner(self) -> str:
+        """What follows a range in texts: how it is searched, unless evenly."""
+        return " in decades" if self.scale == "log" else ""
 
     @property
     def label(self) -> str:
@@ -149,10 +184,12 @@ class ParameterRange(Range):
         description: its meaning, from the model.
         kind: type of its value; every type except real has integer values.
         items: names and numbers of an enumeration's items.
+        scale: ``log`` if it is searched evenly in decades, for which low must be positive.
         nominal: its value if it is not searched, if known.
 
     Raises:
-        SpecError: if the bounds are not finite, in the wrong order or without an allowed number between them.
+        SpecError: if the bounds are not finite, in the wrong order or without an allowed number between them,
+            or the scale is not for them.
     """
 
     _: KW_ONLY
@@ -167,6 +204,7 @@ class Dimension:
     time: float | None  # time of the control point in s; None for a parameter
     low: float  # lower bound
     high: float  # upper bound
+    scale: Scale = "linear"  # that of the range
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -202,7 +240,7 @@ class SearchSpace:
                 raise SpecError(f"{r.label}: {what}: {period:g} s is longer than {end}; shorten it")
 
     def __repr__(self) -> str:
-        searched = ", ".join(f"{r.name} in [{r.low:g}, {r.high:g}]" for r in self.ranges)
+        searched = ", ".join(f"{r.name} in [{r.low:g}, {r.high:g}]{r.manner}" for r in self.ranges)
         return f"<SearchSpace: {searched}; {self.stop_time:.10g} s>"
 
     @property
@@ -240,7 +278,7 @@ class SearchSpace:
     def dimensions(self) -> tuple[Dimension, ...]:
         """Coordinates of the vector form: control points input by input in time order, then parameters."""
         points = (Dimension(r.name, t, r.low, r.high) for r in self.inputs for t in self.fixed_times(r))
-        return (*points, *(Dimension(p.name, None, p.low, p.high) for p in self.parameters))
+        return (*points, *(Dimension(p.name, None, p.low, p.high, p.scale) for p in self.parameters))
 
     @property
     def candidates(self) -> float:
@@ -403,9 +441,9 @@ def _into_range(value: float, ranged: Range) -> float:
 
 def is_outside(ranged: Range, value: float) -> bool:
     """Whether a value is farther outside a range than a rounding."""
-    # Whatever is nearest to an allowed number is rounded to it.
-    tolerance = _ROUNDING_SHARE * (ranged.high - ranged.low) if ranged.kind == "real" else 0.5
-    return not ranged.low - tolerance <= value <= ranged.high + tolerance
+    if ranged.kind != "real":  # whatever is nearest to an allowed number is rounded to it
+        return not ranged.low - 0.5 <= value <= ranged.high + 0.5
+    return not ranged.at(-_ROUNDING_SHARE) <= value <= ranged.at(1.0 + _ROUNDING_SHARE)
 
 
 def _signal_outside(r: InputRange, signal: Signal) -> str:

@@ -54,9 +54,19 @@ def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> l
     return facts
 
 
-def in_one_line(candidate: Candidate) -> str:
-    """Return a candidate in one line."""
-    return "; ".join(text for _, text in candidate_facts(candidate))
+def in_one_line(candidate: Candidate, space: SearchSpace | None = None) -> str:
+    """Return a candidate in one line, with units and names as above."""
+    return "; ".join(text for _, text in candidate_facts(candidate, space))
+
+
+def named(number: str, kind: str, items: Iterable[tuple[str, int]]) -> str:
+    """Return a whole number and its name, if it is one of a Boolean or an enumeration.
+
+    >>> named("1", "boolean", ()), named("2", "integer", ())
+    ('1 = true', '2')
+    """
+    names = {str(n): name for n, name in number_names(kind, items).items()}
+    return f"{number} = {names[number]}" if number in names else number
 
 
 def signal_text(signal: Signal) -> str:

@@ -12,7 +12,7 @@ from math import inf
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.core.space import InputRange, ParameterRange, nearest_value
-from falsifier.core.words import in_unit, readable
+from falsifier.core.words import in_unit, named, readable
 from falsifier.counterexamples.shrink import (
     constant_signal,
     sampled_stretches,
@@ -132,13 +132,15 @@ class Explanation:
 
     def _instead(self, effect: Effect) -> str:
         unit = next((v.unit for v in self.problem.info.variables if v.name == effect.name), "")
-        number = in_unit(readable(effect.instead, 4), unit)
         ranged = next(r for r in self.problem.space.ranges if r.name == effect.name)
+        number = in_unit(named(readable(effect.instead, 4), ranged.kind, ranged.items), unit)
         if effect.is_rest:
             return f"{'at rest' if isinstance(ranged, InputRange) else 'at its nominal value'} ({number})"
         is_between = ranged.low < effect.instead < ranged.high
-        middle = "at" if effect.instead == (ranged.low + ranged.high) / 2 else "near"
-        return f"{f'{middle} the middle of its range' if is_between else 'at an end of its range'} ({number})"
+        middle = (
+            f"{'at' if effect.instead == ranged.at(0.5) else 'near'} the middle of its range{ranged.manner}"
+        )
+        return f"{middle if is_between else 'at an end of its range'} ({number})"
 
 
 def explain(problem: Problem, evaluation: Evaluation) -> Explanation:
@@ -184,7 +186,7 @@ def _reset(problem: Problem, ranged: InputRange | ParameterRange, values: tuple[
     rest = rest_value(problem, ranged)
     if rest is not None and any(v != rest for v in values):
         return Effect(ranged.name, None, rest, is_rest=True)
-    middle = (ranged.low + ranged.high) / 2
+    middle = ranged.at(0.5)
     # Of two that are equally near, such as those of a Boolean, the other one.
     aside = 0.0 if ranged.kind == "real" else 0.25 if values[0] < middle else -0.25
     return Effect(ranged.name, None, nearest_value(ranged, middle + aside), is_rest=False)

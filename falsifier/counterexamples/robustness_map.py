@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
+from falsifier.core.space import Scale
 from falsifier.core.words import counted, listed, readable, with_unit
 from falsifier.counterexamples.shrink import sampled_stretches, with_parameter, with_signal, with_stretch
 from falsifier.errors import SpecError, setting
@@ -44,6 +45,7 @@ class Coordinate:
         low: lower bound.
         high: upper bound.
         unit: unit of the value.
+        scale: ``log`` if changes are shares of the range's decades.
     """
 
     name: str
@@ -53,6 +55,7 @@ class Coordinate:
     low: float
     high: float
     unit: str = ""
+    scale: Scale = "linear"
 
     @property
     def label(self) -> str:
@@ -171,6 +174,8 @@ def robustness_map(
         change = f"{_percent(radius)} of the range of a whole number is no change"
         raise SpecError(f"{problem.name}: {change}; in Python, robustness_map accepts a larger radius")
     start, low, high = np.array([(c.value, c.low, c.high) for c in coordinates]).T
+    logs = np.array([c.scale == "log" for c in coordinates])
+    start, low, high = (np.log(numbers, where=logs, out=numbers) for numbers in (start, low, high))
     reach, is_whole = radius * (high - low), np.array([c.name in discrete for c in coordinates])
     reach[is_whole] = np.floor(reach[is_whole] + _ROUNDING)
     unit = Sobol(len(coordinates), seed=seed).random_base2((samples - 1).bit_length())[:samples]
@@ -185,6 +190,7 @@ def robustness_map(
     if not samples:
         raise SpecError(f"{setting('budget')}: {budget} simulations are too few to change a whole number")
     sizes = np.abs((values - start) / (high - low)).max(axis=1)
+    values = np.exp(values, where=logs, out=values)
     robustness = np.array(_simulated(problem, candidate, coordinates, values))
     if not robustness.size:
         raise KeyboardInterrupt
@@ -197,7 +203,7 @@ def robustness_map(
     rows = np.tile(start, (points ** len(axes), 1))
     # The second axis first, so that the first one varies along the rows of the surface.
     rows[:, axes[::-1]] = np.stack(np.meshgrid(*grid[::-1], indexing="ij"), axis=-1).reshape(-1, len(axes))
-    rows = rows if robustness.size == samples else rows[:0]
+    rows = np.exp(rows, where=logs, out=rows)[: len(rows) if robustness.size == samples else 0]
     judged = _simulated(problem, candidate, coordinates, rows)
     surface = np.array(judged + [np.nan] * (points ** len(axes) - len(judged)))
     return RobustnessMap(
@@ -209,7 +215,7 @@ def robustness_map(
         robustness,
         tuple(influences.tolist()),
         axes,
-        grid,
+        tuple(np.exp(numbers) if logs[i] else numbers for i, numbers in zip(axes, grid, strict=True)),
         surface.reshape(-1, points),
         interrupted=len(judged) < len(surface),
     )
@@ -237,7 +243,7 @@ def _coordinates(problem: Problem, candidate: Candidate) -> Iterator[Coordinate]
             time = signal.moments[first] if len(found) > 1 else None
             yield Coordinate(r.name, (first, end), time, signal.values[first], r.low, r.high, r.unit)
     for p in problem.space.parameters:
-        yield Coordinate(p.name, None, None, candidate.parameters[p.name], p.low, p.high, p.unit)
+        yield Coordinate(p.name, None, None, candidate.parameters[p.name], p.low, p.high, p.unit, p.scale)
 
 
 def _simulated(

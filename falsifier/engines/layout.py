@@ -121,8 +121,8 @@ class Layout:
             if r.low == r.high:
                 result[..., group] = 0.0
             elif r.kind != "real":
-                values = r.low + (r.high - r.low) * np.clip(result[..., group], 0.0, 1.0)
-                result[..., group] = (nearest_numbers(r, values) - r.low) / (r.high - r.low)
+                values = r.at(np.clip(result[..., group], 0.0, 1.0))
+                result[..., group] = r.share_of(nearest_numbers(r, values))
         return result
 
     def inputs(self, points: Array, grid: TimeGrid) -> Array:
@@ -138,7 +138,7 @@ class Layout:
         point = np.clip(point, 0.0, 1.0)
         signals = {}
         for r, coding, group in zip(self.space.inputs, self.codings, self.groups, strict=False):
-            values = r.low + (r.high - r.low) * point[group]
+            values = r.at(point[group])
             keep = np.ones(len(values), dtype=bool)
             if coding.free:
                 keep[1:] = values[1:] != values[:-1]
@@ -147,10 +147,7 @@ class Layout:
                 tuple(float(t) for t in times), tuple(float(v) for v in values[keep]), coding.interpolation
             )
         scalars = point[len(point) - len(self.space.parameters) :]
-        parameters = {
-            p.name: float(p.low + (p.high - p.low) * v)
-            for p, v in zip(self.space.parameters, scalars, strict=True)
-        }
+        parameters = {p.name: float(p.at(v)) for p, v in zip(self.space.parameters, scalars, strict=True)}
         return self.space.admit(Candidate(signals, parameters, origin, rationale))
 
     def represents(self, candidate: Candidate) -> bool:
@@ -171,9 +168,9 @@ class Layout:
             values = np.asarray(
                 signal.values if signal.times == coding.times else signal.held(None).sample(at)
             )
-            parts.append((values - r.low) / ((r.high - r.low) or 1.0))
+            parts.append(r.share_of(values))
         for p in self.space.parameters:
-            parts.append(np.array([(candidate.parameters[p.name] - p.low) / ((p.high - p.low) or 1.0)]))
+            parts.append(np.array([p.share_of(candidate.parameters[p.name])]))
         return np.asarray(np.clip(np.concatenate(parts), 0.0, 1.0))
 
 

@@ -189,13 +189,16 @@ def reason_in_remark(reason: str) -> str:
 def random_change(space: SearchSpace, best: Candidate | None, *, seed: tuple[int, ...]) -> Candidate:
     """Return a random change of a candidate in at least one number; without one, any point of the space."""
     rng = np.random.default_rng(seed)
-    low, high = space.bounds.T
+    logs = np.array([d.scale == "log" for d in space.dimensions])
+    old = space.bounds[:, 0] if best is None else space.encode(best)
+    low, high, old = (np.log(v, where=logs, out=v.copy()) for v in (*space.bounds.T, old))
     if best is None:
-        return space.decode(low + rng.random(len(low)) * (high - low))
+        new = low + rng.random(len(low)) * (high - low)
+        return space.decode(np.exp(new, where=logs, out=new))
     changed = rng.random(len(low)) < _SHARE
     changed[rng.integers(len(low))] = True
     noise = np.where(changed, rng.normal(0.0, _DEVIATION, len(low)) * (high - low), 0.0)
-    old = space.encode(best)
     is_inside = (low <= old + noise) & (old + noise <= high)
     # A step across a limit is taken the other way, or a number at its limit would often not change at all.
-    return space.decode(np.clip(np.where(is_inside, old + noise, old - noise), low, high))
+    new = np.clip(np.where(is_inside, old + noise, old - noise), low, high)
+    return space.decode(np.exp(new, where=logs, out=new))

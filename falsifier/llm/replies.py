@@ -11,7 +11,7 @@ from typing import Any
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import shortest
 from falsifier.core.signals import INTERPOLATIONS, Signal
-from falsifier.core.space import Dimension, InputRange, Range, SearchSpace, nearest_value
+from falsifier.core.space import InputRange, Range, SearchSpace, nearest_value
 from falsifier.core.words import counted
 from falsifier.errors import CandidateError, SpecError, did_you_mean
 from falsifier.llm.candidate_text import (
@@ -147,7 +147,7 @@ class ReplyForm:
         for place, (value, d) in enumerate(zip(written, dimensions, strict=True), start=1):
             if isinstance(value, bool) and not _is_truth(ranges[d.name]):
                 raise RejectedReplyError(f"number {place}: {quoted(str(value).lower())} is no number")
-        numbers = [_clamped(v, d) for v, d in zip(written, dimensions, strict=True)]
+        numbers = [_clamped(v, ranges[d.name]) for v, d in zip(written, dimensions, strict=True)]
         outside = [
             f"number {place}: {value:.12g} is outside its range [{d.low:.12g}, {d.high:.12g}]"
             for place, (value, d) in enumerate(zip(numbers, dimensions, strict=True), start=1)
@@ -170,10 +170,9 @@ def _is_truth(ranged: Range) -> bool:
     return ranged.kind == "boolean" or (ranged.kind == "integer" and (ranged.low, ranged.high) == (0.0, 1.0))
 
 
-def _clamped(value: float, ranged: Range | Dimension) -> float:
+def _clamped(value: float, ranged: Range) -> float:
     """The value, or the limit that it exceeds by a rounding."""
-    slack = _ROUNDING * (ranged.high - ranged.low)
-    if ranged.low - slack <= value <= ranged.high + slack:
+    if ranged.at(-_ROUNDING) <= value <= ranged.at(1.0 + _ROUNDING):
         return min(max(value, ranged.low), ranged.high)
     return value
 

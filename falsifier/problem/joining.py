@@ -22,6 +22,7 @@ from falsifier.problem.sections import InputSection, ModelChanges, ParameterSect
 from falsifier.problem.shorthand import searching, stated_as
 from falsifier.problem.source import STL_NAME
 from falsifier.problem.spec import AnyRequirement, Spec, overlay, parse_spec
+from falsifier.problem.unit_check import defined_units, factor_and_offset
 
 # Maximum number of states or locals that are recorded if the FMU declares no outputs.
 _MAX_RECORDED = 50
@@ -110,7 +111,7 @@ def join(
             space,
             _recording(experiment, info, [*spec.model.record, *formula.signals], known, omitted),
             fixed,
-            (*info.notes, *_notes(grid, model, space, experiment)),
+            (*info.notes, *_notes(grid, model, space, fixed, experiment)),
         )
 
 
@@ -232,20 +233,31 @@ def _experiment(
     return experiment, grid
 
 
-def _notes(grid: Grid | None, model: Model, space: SearchSpace, experiment: Experiment) -> Iterator[str]:
+def _notes(
+    grid: Grid | None, model: Model, space: SearchSpace, fixed: Mapping[str, float], experiment: Experiment
+) -> Iterator[str]:
     if grid is not None:
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
     for r in space.inputs:
         if r.hold is not None and r.hold < (step := experiment.step):
             yield f"{r.name}: hold = {readable(r.hold)} s is shorter than the communication step, {step:g} s"
-    for p in space.ranges:
-        variable = model.info[p.name]
-        start, shown = variable.start_number, variable.display_unit
-        if p.unit and shown not in ("", p.unit) and start is not None and not p.low <= start <= p.high:
-            yield (
-                f"{p.name}: its start value, {readable(start)} {p.unit}, is outside the range; all numbers "
-                f"are in {p.unit}, not in {shown}, in which the FMU wants it displayed"
-            )
+    ranges = {r.name: r for r in space.ranges}
+    for name in (*ranges, *fixed):
+        variable = model.info[name]
+        start, unit, shown = variable.start_number, variable.unit, variable.display_unit
+        if start is None or not unit or shown in ("", unit):
+            continue
+        if name in ranges:
+            is_strange = not ranges[name].low <= start <= ranges[name].high
+            what = f"its start value, {readable(start)} {unit}, is outside the range"
+        else:
+            value = fixed[name]
+            factor, offset = factor_and_offset(shown, unit, defined_units(model)) or (1.0, 0.0)
+            is_strange = abs(factor * value + offset - start) < abs(value - start)
+            what = f"{readable(value)} {shown} would be nearer to its start value, {readable(start)} {unit}"
+        if is_strange:
+            how = f"all numbers are in {unit}, not in {shown}, in which the FMU wants it displayed"
+            yield f"{name}: {what}; {how}"
     yield from rights_notes(model)
 
 
@@ -330,9 +342,11 @@ def placed(changes: ModelChanges, info: ModelInfo) -> ModelChanges:
             if isinstance(text := section.value, str) and variable.kind != "string":
                 number = number_in(text) if variable.number_of(text) is None else None
                 stated["value"] = text if number is None else number
+            if variable.causality == "input" and "scale" in stated:
+                raise SpecError("is an input: only parameters can have a scale; leave it out")
             if variable.causality == "input":
                 inputs[name] = InputSection.model_validate(stated)
-            elif not stated.keys() <= {"range", "value"}:
+            elif not stated.keys() <= {"range", "value", "scale"}:
                 value_kind(variable)
                 raise SpecError(f"is no input: {searching(kind, name)} searches it, without control points")
             else:

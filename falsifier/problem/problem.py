@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 from falsifier.context.values import Context, Named
 from falsifier.core.arguments import finite, instance, path_of, texts
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
-from falsifier.core.space import SearchSpace
+from falsifier.core.space import SearchSpace, number_names
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System
 from falsifier.problem.requirement import Requirement
@@ -30,6 +30,7 @@ class Held:
     # The number or text at which it is held; None: the model's own, which it does not state.
     value: float | str | None
     reason: str  # why it is not searched, in words
+    item: str = ""  # the name of the value: of an enumeration's item, or true or false of a Boolean
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -199,16 +200,7 @@ class Problem:
         names = {v.name for v in listed}
         # Start values and elements that are given belong to variables of other kinds.
         listed += [v for v in self.info.variables if v.name in given and v.name not in names]
-        return tuple(
-            Held(
-                v.name,
-                "input" if v.causality == "input" else "parameter",
-                given.get(v.name, v.start),
-                _held_because(v, self.info, is_given=v.name in given),
-            )
-            for v in listed
-            if v.name not in searched
-        )
+        return tuple(_held(v, self.info, given) for v in listed if v.name not in searched)
 
     @property
     def held_inputs(self) -> tuple[Held, ...]:
@@ -233,7 +225,15 @@ class Problem:
             self.experiment,
             sorted(self.parameters.items()),
         )
-        return sha256(repr(content).encode()).hexdigest()
+        # Without what is usual: runs that were recorded before there was a choice can be continued.
+        return sha256(repr(content).replace(", scale='linear'", "").encode()).hexdigest()
+
+
+def _held(v: Variable, info: ModelInfo, given: Mapping[str, float | str]) -> Held:
+    value, names = given.get(v.name, v.start), number_names(v.kind, v.items)
+    item = names.get(int(value), "") if names and not isinstance(value, str | None) else ""
+    reason = _held_because(v, info, is_given=v.name in given)
+    return Held(v.name, "input" if v.causality == "input" else "parameter", value, reason, item)
 
 
 def _held_because(variable: Variable, info: ModelInfo, *, is_given: bool) -> str:
@@ -252,13 +252,15 @@ def _held_because(variable: Variable, info: ModelInfo, *, is_given: bool) -> str
 def held_text(held: Iterable[Held]) -> str:
     """Say which inputs and parameters are not searched, by reason; empty if all are.
 
-    >>> held_text([Held("u", "input", 1.0, "its value is given"), Held("v", "input", None, "no range")])
-    'u = 1 (its value is given); v (no range)'
+    >>> held_text([Held("u", "input", 1.0, "its value is given", "on"), Held("v", "input", None, "no range")])
+    'u = 1 (on) (its value is given); v (no range)'
     """
     by_reason: dict[str, list[str]] = {}
     for each in held:
         value = each.value if isinstance(each.value, str | None) else f"{each.value:g}"
-        by_reason.setdefault(each.reason, []).append(each.name if value is None else f"{each.name} = {value}")
+        item = f" ({each.item})" if each.item else ""
+        said = each.name if value is None else f"{each.name} = {value}{item}"
+        by_reason.setdefault(each.reason, []).append(said)
     return "; ".join(f"{', '.join(values)} ({reason})" for reason, values in by_reason.items())
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 from falsifier.core.literals import shortest
@@ -134,6 +135,7 @@ def _parameter_range(variable: Variable, section: ParameterSection) -> Parameter
         description=variable.description,
         kind=kind,
         items=variable.items,
+        scale=section.scale or "linear",
     )
 
 
@@ -175,7 +177,10 @@ def _kind(variable: Variable) -> str:
 def _check(variable: Variable, key: str, *numbers: float) -> None:
     """Check the ends of a range, or a single value, against the variable's type and the FMU's min and max."""
     shown = f"{numbers[0]:.12g}" if key == "value" else "[{:.12g}, {:.12g}]".format(*numbers)
-    if excess := variable.excess(numbers[0], numbers[-1]):
+    # The start value may be stated again: the FMU has it, whatever its min and max.
+    is_start = key == "value" and numbers[0] == variable.start_number
+    limited = replace(variable, low=None, high=None) if is_start else variable
+    if excess := limited.excess(numbers[0], numbers[-1]):
         raise SpecError(f"{shown} {excess}", key=key)
     # Whether a range contains such a number is checked by the range itself.
     if key == "value" and (expected := variable.expected(numbers[0])):

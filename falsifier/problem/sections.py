@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 from falsifier.core.arguments import utf_8
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation
+from falsifier.core.space import Scale
 from falsifier.core.strict import Strict
 from falsifier.errors import did_you_mean, shown, written
 from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method
@@ -152,6 +153,9 @@ class ParameterSection(Section):
     range: Ends | None = Field(
         None, description="[low, high], numbers or names of items, to search; default: FMU's min and max."
     )
+    scale: Scale | None = Field(
+        None, description="log: search the range evenly in decades, low must be above 0; default: linear."
+    )
     value: Value | None = Field(
         None,
         description="Fixed value: a number, the name of an enumeration's item, or the text of a string. A "
@@ -160,8 +164,9 @@ class ParameterSection(Section):
 
     @model_validator(mode="after")
     def _searched_or_fixed(self) -> "ParameterSection":
-        if self.range is not None and self.value is not None:
-            raise ValueError("value fixes the parameter, range searches it; remove one of them")
+        if self.value is not None and (self.range is not None or self.scale is not None):
+            searching = "scale is how to search it" if self.range is None else "range searches it"
+            raise ValueError(f"value fixes the parameter, {searching}; remove one of them")
         return self
 
 

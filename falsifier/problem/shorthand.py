@@ -4,13 +4,14 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import ValidationError
 
 from falsifier.core.arguments import instance, texts
 from falsifier.core.literals import number_in, shortest
 from falsifier.core.model import Interface
+from falsifier.core.space import Scale
 from falsifier.errors import SpecError, first_fault, in_section, naming, setting, shown, written
 from falsifier.fmu import Rights, resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
@@ -23,8 +24,8 @@ KEYS_WITH_OPTION = ("interface", "stop_time", "output_interval", "time_limit", "
 _QUOTED = r"""(?:"(?:[^"\\]|\\.)*"|'[^']*')"""
 # A template and its first argument; no formula begins like this.
 _TEMPLATE = re.compile(r"\s*([a-z_]+)\s+\w+\s*=(?!=)")
-# What may follow the ends of an input's range.
-_OF_INPUTS = ("control_points", "interpolation")
+# What may follow the ends of an input's range, and of a parameter's.
+_OF_INPUTS, _OF_PARAMETERS = ("control_points", "interpolation"), ("scale",)
 # One argument of a template: spaces only in quotes and in lists.
 _ARGUMENT = re.compile(rf"""(?:=\[(?:{_QUOTED}|[^"'\]])*\]|{_QUOTED}|[^\s"'])+""")
 
@@ -41,9 +42,9 @@ InputChoice = (
     | InputSection
     | None
 )
-# A value, or text for a string; a range to search; None to search between the FMU's min and max; or a
-# complete section of a spec.
-ParameterChoice = Value | tuple[Value, Value] | ParameterSection | None
+# A value, or text for a string; a range to search, evenly or in decades: (low, high, "log"); None to search
+# between the FMU's min and max; or a complete section of a spec.
+ParameterChoice = Value | tuple[Value, Value] | tuple[Value, Value, Scale] | ParameterSection | None
 
 Choice = TypeVar("Choice")
 
@@ -73,9 +74,7 @@ def changes_from(
         if wrong := [n for n in choices if not isinstance(n, str)]:
             raise SpecError(f"{what}: names must be text, got the key {wrong[0]!r}")
         data[what] = {name: _section(what, name, _from_numpy(c)) for name, c in choices.items()}
-    if both := sorted(inputs.keys() & parameters.keys()):
-        why = written("--set keeps it constant, --search varies it", "given in inputs and in parameters")
-        raise SpecError(f"{both[0]}: {why}; drop one of them")
+    _check_apart(inputs, parameters)
     listed = {"omit": texts("omit", omit), **given_rights(allow, deny)}
     data |= {name: words for name, words in listed.items() if words}
     try:
@@ -84,10 +83,17 @@ def changes_from(
         key, message = first_fault(error)
         kind, name = (*error.errors()[0]["loc"], "")[:2]
         if kind in data:
-            key = written(stated_as(str(kind), str(name), searched=kind == "inputs"), key)
+            searched = kind == "inputs" or (kind == "parameters" and "range" in data[kind].get(name, ()))
+            key = written(stated_as(str(kind), str(name), searched=searched), key)
         else:
             key = setting(key)
         raise SpecError(message, file=key) from None
+
+
+def _check_apart(inputs: Iterable[str], parameters: Iterable[str]) -> None:
+    if both := sorted(set(inputs) & set(parameters)):
+        why = written("--set keeps it constant, --search varies it", "given in inputs and in parameters")
+        raise SpecError(f"{both[0]}: {why}; drop one of them")
 
 
 def given_rights(allow: Iterable[str], deny: Iterable[str]) -> dict[str, tuple[str, ...]]:
@@ -120,15 +126,22 @@ def changes_from_options(
         values: ``name=value`` (an input is kept constant, a parameter or start value set) or ``name=text`` (a
             string; a file is named relative to the current folder).
         ranges: ``name=low:high`` (an input is searched with the spec's control points, or else a free
-            parameterization), ``name=low:high:points``, ``name=low:high:points:interpolation``, or ``name``
-            (searched as in the spec, or between the FMU's min and max).
+            parameterization), ``name=low:high:points``, ``name=low:high:points:interpolation``,
+            ``name=low:high:log`` (a parameter is searched in decades), or ``name`` (searched as in the spec,
+            or between the FMU's min and max).
         more: ``allow``, ``deny`` and fields of ModelChanges; see ``changes_from``.
 
     Raises:
         SpecError: naming the option that is invalid.
     """
-    constant = _once("--set", map(_value, values))
-    return changes_from(inputs=_once("--search", map(_range, ranges)), parameters=constant, **more)
+    constant: dict[str, Any] = _once("--set", map(_value, values))
+    searched: dict[str, Any] = _once("--search", map(_range, ranges))
+    _check_apart(searched, constant)
+    # What names a scale can be a parameter only.
+    for name, choice in list(searched.items()):
+        if isinstance(choice, tuple) and choice[2:3] and choice[2] in get_args(Scale):
+            constant[name] = searched.pop(name)
+    return changes_from(inputs=searched, parameters=constant, **more)
 
 
 def options_from(changes: ModelChanges) -> list[tuple[str, str]]:
@@ -153,6 +166,7 @@ def without_option(changes: ModelChanges) -> list[str]:
         is_whole = section.range is not None and section.control_points is not None
         said = ("range", "value", *(("control_points", "interpolation") if is_whole else ()))
         keys += [f"inputs.{name}.{key}" for key in section.model_dump(exclude_none=True) if key not in said]
+    keys += [f"parameters.{name}.scale" for name, p in changes.parameters.items() if p.scale and not p.range]
     return keys
 
 
@@ -162,7 +176,9 @@ def _option(name: str, section: InputSection | ParameterSection) -> tuple[str, s
     if section.range is None:
         return "--search", name
     said = list(map(_said, section.range))
-    if isinstance(section, InputSection) and section.control_points is not None:
+    if isinstance(section, ParameterSection):
+        said += [section.scale] if section.scale else []
+    elif section.control_points is not None:
         said += [str(section.control_points), *([section.interpolation] if section.interpolation else [])]
     return "--search", f"{name}={':'.join(said)}"
 
@@ -173,7 +189,7 @@ def _said(value: float | str) -> str:
 
 def _section(kind: str, name: str, choice: InputChoice | ParameterChoice) -> object:
     """Return the section that a choice for an input or a parameter stands for, or its keys."""
-    own, keys = (ParameterSection, ()) if kind == "parameters" else (InputSection, _OF_INPUTS)
+    own, keys = (ParameterSection, _OF_PARAMETERS) if kind == "parameters" else (InputSection, _OF_INPUTS)
     match choice:
         case None:
             return {}
@@ -184,7 +200,8 @@ def _section(kind: str, name: str, choice: InputChoice | ParameterChoice) -> obj
             return {"value": named_file(str(choice), Path()) if is_file else choice}
         case (low, high, *more) if len(more) <= len(keys):
             return {"range": (low, high)} | dict(zip(keys, more, strict=False))
-    said = "a number, (low, high[, points[, interpolation]])" if keys else "a number, text, (low, high)"
+    said = "a number, (low, high[, points[, interpolation]])"
+    said = said if own is InputSection else "a number, text, (low, high[, scale])"
     raise SpecError(f"{kind}.{name}: expected {said}, {own.__name__} or None, got {shown(choice)}")
 
 
@@ -229,7 +246,7 @@ def _range(option: str) -> tuple[str, InputChoice]:
         return name, None
     try:
         low, high, *more = (part.strip() for part in said.split(":"))
-        points = [int(number) for number in more[:1]]
+        points = [number if number in get_args(Scale) else int(number) for number in more[:1]]
         choice: Any = (_end(low), _end(high), *points, *more[1:])
         if name and low and high and len(choice) <= 4:
             return name, choice
@@ -237,7 +254,8 @@ def _range(option: str) -> tuple[str, InputChoice]:
         pass
     raise SpecError(
         f"--search {option}: expected NAME=LOW:HIGH[:POINTS[:INTERPOLATION]], for example --search "
-        f"throttle=0:100:7; to keep it constant: --set {name or 'throttle'}=VALUE"
+        "throttle=0:100:7, or of a parameter NAME=LOW:HIGH:log; to keep it constant: "
+        f"--set {name or 'throttle'}=VALUE"
     )
 
 

@@ -193,15 +193,13 @@ def overlay(base: Section | None, changes: Section) -> Section:
     if base is None:
         return changes
     stated = {name: getattr(changes, name) for name in changes.model_fields_set}
-    if isinstance(base, sections.InputSection):
+    if isinstance(base, sections.InputSection | sections.ParameterSection):
         if "value" in stated:  # a fixed value replaces a searched range and vice versa
             return changes
         stated.setdefault("value", None)
         # Control points or interpolation that are overridden are meant to be used: no free parameterization.
         if {"control_points", "interpolation"} & stated.keys():
             stated.setdefault("free", None)
-    if isinstance(base, sections.ParameterSection):
-        return changes if stated else base.model_copy(update={"value": None})
     return base.model_copy(update=stated)
 
 

@@ -135,7 +135,9 @@ def _parameters(tunable: Sequence[Variable], *, searched: Sequence[Variable]) ->
         lines.append(_noted(f"{toml_key(v.name)}.range = {limits}", "replace with the real range"))
     others = [v for v in tunable if v not in searched]
     if others:
-        lines.append("# Each may be searched, or fixed with NAME = NUMBER:")
+        lines.append(
+            '# Each may be searched (over decades: add NAME.scale = "log"), or fixed with NAME = NUMBER:'
+        )
     listed = others[:_SHOWN_PARAMETERS]
     listed += [v for v in others if v.is_state and v not in listed][:_SHOWN_PARAMETERS]
     for v in listed:

@@ -76,6 +76,7 @@ def coverage_json(found: Coverage) -> dict[str, Any]:
                 "name": r.searched.name,
                 "unit": r.searched.unit,
                 "range": [r.searched.low, r.searched.high],
+                "scale": r.searched.scale,
                 "tried": None if r.low is None else [r.low, r.high],
                 "parts": r.parts.tolist(),
                 "gaps": [list(gap) for gap in r.gaps],
@@ -113,7 +114,7 @@ def _range_row(r: RangeCoverage) -> tuple[str, ...]:
     changes = ", ".join(f"{pace} in {r.paces[pace]}" for pace in PACES if r.paces.get(pace))
     return (
         with_unit(r.searched.name, r.searched.unit),
-        _span(r.searched.low, r.searched.high),
+        _span(r.searched.low, r.searched.high) + r.searched.manner,
         tried,
         f"{r.tried} of {len(r.parts)}",
         changes if r.paces else "parameter",

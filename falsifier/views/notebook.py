@@ -67,7 +67,7 @@ def problem_html(problem: Problem) -> str:
         *((f"fixed {name}", readable(value)) for name, value in problem.parameters.items()),
     ]
     header = ("searched", "unit", "range", "control points", "description")
-    bounds = {r.name: f"{readable(r.low)} to {readable(r.high)}" for r in problem.space.ranges}
+    bounds = {r.name: f"{readable(r.low)} to {readable(r.high)}{r.manner}" for r in problem.space.ranges}
     points = {r.name: f"{r.control_points}, {r.interpolation}" for r in problem.space.inputs}
     rows = [
         (r.name, r.unit, bounds[r.name], points.get(r.name, "one value"), r.description)

@@ -16,7 +16,7 @@ from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.run import falsify
 from falsifier.testing import BIAS, FREE, START, Array, lag_problem
 from tests.engines.support import doubtful
-from tests.problems import mostly_broken, never, straight
+from tests.problems import decades, mostly_broken, never, straight
 
 
 def system(limit: float):  # type: ignore[no-untyped-def]
@@ -142,6 +142,7 @@ def test_what_a_probability_is_of_is_said() -> None:
         "other control points, which a search may try, are not drawn",
     ):
         assert part in text
+    assert "bias log-uniform in [1e-07, 1]" in assess(decades(), budget=1).text
     gear = InputRange("u", 1, 4, kind="integer", interpolation="constant")
     held = InputRange("v", 0, 1, control_points=3, hold=0.5, interpolation="pchip")
     problem = replace(lag_problem(inputs=2, limit=4), space=SearchSpace((gear, held), (), 10.0))
@@ -156,6 +157,11 @@ def test_each_allowed_number_is_equally_likely() -> None:
     drawn = Draws(replace(lag_problem(), space=SearchSpace((gear,), (mode,), 10.0)), seed=0).ask(1200)
     numbers = Counter((c.signals["u"].values[0], c.parameters["x0"]) for c in drawn)
     assert numbers.keys() == set(product((1, 2, 3, 4), (1, 2, 5))) and min(numbers.values()) > 70
+
+
+def test_a_range_in_decades_is_drawn_evenly_in_them() -> None:
+    drawn = Draws(decades(), seed=0).ask(1000)
+    assert 450 < sum(c.parameters["bias"] < 10**-3.5 for c in drawn) < 550
 
 
 def test_at_a_bound_so_few_or_so_many_are_just_as_improbable_as_stated() -> None:

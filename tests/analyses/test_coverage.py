@@ -8,13 +8,13 @@ import pytest
 
 from falsifier import Candidate, Signal, Trajectory, coverage, falsify
 from falsifier.analyses.coverage import Coverage, coverage_of, pace_of
-from falsifier.core.space import Range
+from falsifier.core.space import ParameterRange, Range
 from falsifier.errors import SpecError
 from falsifier.record.manifest import Manifest, ModeRecord, describe
 from falsifier.search.request import RunRequest
 from falsifier.testing import lag_problem
 from falsifier.views.analyses_text import coverage_json, coverage_text
-from tests.problems import mostly_broken
+from tests.problems import decades, mostly_broken
 
 TIMES = np.linspace(0.0, 10.0, 11)
 
@@ -38,6 +38,17 @@ def test_parts_of_a_range_that_no_value_was_in_are_gaps_and_at_first_all_of_them
     p = Range(name="p", low=0.0, high=1.0)
     found = coverage_of(described(Range(name="u", low=0.0, high=1.0), parameters=(p,)), [])
     assert [(r.low, r.tried, r.gaps) for r in found.ranges] == [(None, 0, ((0.0, 1.0),))] * 2
+
+
+def test_parts_of_a_range_in_decades_are_decades(tmp_path: Path) -> None:
+    bias = ParameterRange("p", 1e-8, 100.0, scale="log")
+    found = coverage_of(described(parameters=(bias,)), [(Candidate({}, {"p": 3e-5}), None)])
+    (p,) = found.ranges
+    assert p.parts.tolist() == [0, 0, 0, 1, 0, 0, 0, 0, 0, 0]
+    np.testing.assert_allclose(p.gaps, ((1e-8, 1e-5), (1e-4, 100.0)))
+    assert "1e-08 to 100 in decades" in coverage_text(found, "R")
+    falsify(decades(), "uniform", budget=3, directory=tmp_path)
+    assert coverage_json(coverage(tmp_path))["searched"][0]["scale"] == "log"
 
 
 @pytest.mark.parametrize(("hold", "at"), ((None, 4.01), (0.02, 4.01), (0.02, 4.02)))

@@ -49,6 +49,7 @@ def test_a_spec_that_allows_more_than_the_run_had_gives_a_replay_no_more(tmp_pat
 
 def test_at1_shrinks_to_full_throttle_and_no_brake(folder: Path) -> None:
     done = run(folder, "explain", "run", "--shrink", "--json", code=0)
+    assert re.search(r"simulation \d+: throttle \[%\] ", done.err), "with units, and names of numbers"
     signals = done.json["signals"]
     assert (signals["throttle"]["values"], signals["brake"]["values"]) == ([100.0], [0.0])
     assert done.json["minimal"]

@@ -6,6 +6,7 @@ from falsifier.problem.loading import load_problem
 from tests.analyses.test_lint import SPEC
 from tests.cli.support import ENV
 from tests.command import falsifier
+from tests.fmu.fixtures import path as fixture
 from tests.llm.server import Server, Step, serving
 from tests.problem.support import AT, spec
 
@@ -27,6 +28,14 @@ def test_check_says_what_is_searched(tmp_path: Path) -> None:
     assert repeated.out.count(": ok") == 10
     done = falsifier("check", "CC1", cwd=tmp_path, code=0)
     assert done.out.startswith("CC1: ok, ") and done.out.endswith("nothing found\n")
+    shutil.copy(fixture("Echo_3"), tmp_path / "echo.fmu")
+    searched = "[inputs.in_Enumeration]\n[requirements.R]\nformula = 'G (out_Int8 <= 3)'\n"
+    (tmp_path / "echo.toml").write_text(f'[model]\nfmu = "echo.fmu"\ninterface = "co-simulation"\n{searched}')
+    done = falsifier("check", "echo.toml", cwd=tmp_path)
+    assert "in_Enumeration [1 = first, 3 = third]" in done.out and "in_Boolean = 0 (false)" in done.out
+    drive = '[parameters.finalDrive]\nrange = [3, 3.5]\nscale = "log"\n'
+    done = falsifier("check", spec(tmp_path, WIDE + drive), cwd=tmp_path)
+    assert "finalDrive [3, 3.5] in decades" in done.out
 
 
 GOOD = {

@@ -136,6 +136,37 @@ def test_an_input_that_cannot_be_searched_is_refused_when_it_is_made(
         InputRange("u", given.pop("low"), given.pop("high"), **given)
 
 
+def test_a_range_in_decades_has_exact_ends_and_no_value_beside_them() -> None:
+    wide = ParameterRange("R", 1.234567e-6, 0.3, scale="log")
+    for r in (wide, ParameterRange("R", -0.3, 0.7), ParameterRange("R", 5e-324, 1.7e308, scale="log")):
+        assert (r.at(0.0), r.at(1.0), r.share_of(r.low), r.share_of(r.high)) == (r.low, r.high, 0.0, 1.0)
+        shares = np.linspace(0.0, 1.0, 9)
+        assert r.share_of(r.at(shares)) == pytest.approx(shares, abs=1e-12)
+    assert ParameterRange("R", 2.0, 2.0, scale="log").share_of(2.0) == 0.0
+    space = SearchSpace((), (wide,), 1.0)
+    assert space.decode([1.23456e-6]).parameters["R"] == wide.low, "a rounding"
+    for value in (0.0, 1e-6):  # a rounding of the width of all, and not in decades
+        with pytest.raises(CandidateError, match=r"outside its range \[1\.234567e-06, 0\.3\]"):
+            space.decode([value])
+    assert repr(space) == "<SearchSpace: R in [1.23457e-06, 0.3] in decades; 1 s>"
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "message"),
+    [
+        (ParameterRange, {"low": 0}, r'scale "log" needs low > 0, got \[0, 9\]; raise low'),
+        (ParameterRange, {"kind": "integer"}, "parameter 'p': only real parameters can have"),
+        (InputRange, {}, "input 'p': only real parameters can have"),
+        (ParameterRange, {"scale": "ln"}, "scale: expected linear or log, got 'ln'"),
+    ],
+)
+def test_a_scale_is_refused_where_there_are_no_decades(
+    kind: type[InputRange | ParameterRange], given: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(SpecError, match=message):
+        kind("p", **{"low": 1.0, "high": 9.0, "scale": "log", **given})
+
+
 def test_other_parts_of_a_space_are_checked_when_they_are_made() -> None:
     u, p = InputRange("u", 0, 1), ParameterRange("p", 2, 2)
     for make, message in (

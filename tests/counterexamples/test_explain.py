@@ -10,7 +10,7 @@ from falsifier.counterexamples.explain import explain
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.testing import Array, lag_problem
-from tests.problems import Columns, broken, conditional
+from tests.problems import Columns, broken, conditional, decades
 
 FREE = Freedom(10, 0.1)
 X0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
@@ -32,6 +32,11 @@ def test_of_each_part_is_said_what_resetting_it_alone_comes_to_and_no_more() -> 
     )
     assert explanation.text.endswith(told)
     assert explanation.diagnosis.critical_time == 10.0
+
+
+def test_the_middle_of_a_range_in_decades_is_one_of_its_decades() -> None:
+    text = explain(decades(), evaluate(decades(), Candidate({}, {"bias": 2e-5}))).text
+    assert "With bias at the middle of its range in decades (0.0003162) alone: +1.0" in text
 
 
 def test_what_broke_comes_first_and_then_what_decided() -> None:
@@ -80,6 +85,10 @@ def test_what_is_at_rest_is_put_to_the_middle_of_its_range() -> None:
         whole = lag_problem(parameters=(ParameterRange("x0", 0.0, high, kind="integer", nominal=0.0),))
         found = explain(whole, evaluate(whole, whole.space.decode([1.0] * 4 + [0.0])))
         assert f"With x0 {told.replace(' (', ' of its range (')} alone" in found.text
+    mode = ParameterRange("x0", 0, 2, kind="enumeration", items=(("off", 0), ("on", 2)), nominal=0.0)
+    named = lag_problem(parameters=(mode,))
+    found = explain(named, evaluate(named, named.space.decode([1.0] * 4 + [0.0])))
+    assert "With x0 at an end of its range (2 = on) alone" in found.text
 
 
 def test_what_resetting_would_not_change_is_left_out() -> None:

@@ -14,6 +14,7 @@ from falsifier.problem.problem import Problem
 from falsifier.stl.margins import on_limit
 from falsifier.testing import lag_problem
 from falsifier.views.plotting import plot_robustness_map, png
+from tests.problems import decades
 
 # x(10) of x' = u - x, x(0) = x0, by Euler with 0.1 s: u + (x0 - u) 0.9**100. The range of u is 2 wide.
 X0 = ParameterRange("x0", -1.0, 1.0, nominal=0.0)
@@ -45,6 +46,18 @@ def test_the_violation_persists_as_far_as_it_does() -> None:
     assert f"the robustness follows u [V] ({u:+.2f}) and x0 ({x0:+.2f}) most (rank correlation)" in found.text
     many = replace(found, robustness=np.r_[np.nan, -np.ones(999)], sizes=np.full(1000, 0.1)).text
     assert "99 % of those up to 10 %" in many and "1 simulation failed and counted as no violation." in many
+
+
+def test_changes_of_a_range_in_decades_are_shares_of_its_decades() -> None:
+    found = robustness_map(
+        decades(), evaluate(decades(), Candidate({}, {"bias": 2e-5})), radius=0.1, budget=60
+    )
+    moved = np.log10(found.values[:, 0] / 2e-5)
+    np.testing.assert_allclose(np.abs(moved) / 7.0, found.sizes, atol=1e-12)
+    assert 0.6 < np.abs(moved).max() <= 0.7 + 1e-9 and moved.min() < -0.4
+    assert found.grid[0] == pytest.approx(np.geomspace(2e-5 * 10**-0.7, 2e-5 * 10**0.7, len(found.grid[0])))
+    assert (found.surface[0] < 0).tolist() == [1e-5 < value < 10**-4.52 for value in found.grid[0]]
+    assert plot_robustness_map(found).axes[1].get_xscale() == "log"
 
 
 def test_a_margin_of_nothing_is_shown_as_everywhere_else() -> None:

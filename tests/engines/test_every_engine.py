@@ -10,6 +10,7 @@ import pytest
 
 from falsifier.core.function_model import FunctionModel
 from falsifier.core.model import Variable
+from falsifier.core.space import ParameterRange
 from falsifier.engines import ENGINES, make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings
@@ -17,10 +18,11 @@ from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
+from falsifier.record.run import falsify
 from falsifier.stl import parse
 from falsifier.testing import FREE, START, Array, EngineContract, Response, drive, lag, lag_problem
 from tests.engines.support import HASTY
-from tests.problems import Columns, still
+from tests.problems import Columns, decades, still, straight
 
 NAMES = [name for name in ENGINES if name != "hybrid"]
 FORMULAS = (
@@ -55,6 +57,26 @@ def test_every_engine_is_registered_by_its_name_and_as_free_if_it_chooses_contro
     chosen = {c.signals["u"].times for c in drive(engine, partial(evaluate, problem), rounds=10)}
     own = {problem.space.fixed_times(problem.space.inputs[0])}
     assert (engine.name, ENGINES[name].is_free) == (name, chosen != own)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_range_in_decades_is_searched_as_its_exponents_are(name: str) -> None:
+    never = "G[0,10] (x <= 3 or x >= -4)"
+    bias = ParameterRange("bias", -7.0, 0.0)
+    exponents = lag_problem(never, parameters=[bias], response=straight)
+    asked, expected = (
+        [c.parameters["bias"] for c in drive(make(name, each), partial(evaluate, each), rounds=20)]
+        for each in (decades(never, inputs=1), exponents)
+    )
+    assert np.log10(asked) == pytest.approx(np.array(expected), abs=1e-6)
+    assert len(set(asked)) > 2
+
+
+def test_a_violation_within_half_a_decade_is_found_in_few_simulations() -> None:
+    for engine, most in (("surrogate", 10), ("cma", 60)):
+        for seed in range(3):
+            result = falsify(decades(), engine, budget=most, seed=seed)
+            assert result.falsified, (engine, seed)
 
 
 def test_an_absent_package_is_an_error_with_the_command_that_brings_it(

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from falsifier.core.candidate import Candidate
 from falsifier.engines.llm import LLMEngine, random_change
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatError
@@ -24,6 +25,7 @@ from falsifier.search.result import Result
 from falsifier.testing import START, EngineContract, lag_problem
 from tests.engines.support import doubtful
 from tests.llm.server import Step, serving
+from tests.problems import decades
 
 
 def reply(values: Sequence[float], rationale: str = "because") -> str:
@@ -76,6 +78,15 @@ def test_a_random_change_is_small_repeatable_and_within_the_ranges() -> None:
         changes.append((space.encode(found) != space.encode(best)).sum())
     assert min(changes) == 1 and max(changes) < 5
     assert len({random_change(space, None, seed=(seed,)).key for seed in range(5)}) == 5
+
+
+def test_a_random_change_of_a_range_in_decades_is_one_of_its_decades() -> None:
+    space = decades().space
+    chosen = [random_change(space, None, seed=(1, k)).parameters["bias"] for k in range(300)]
+    assert 110 < sum(value < 10**-3.5 for value in chosen) < 190
+    old = Candidate({}, {"bias": 2e-5})
+    ratios = [random_change(space, old, seed=(2, k)).parameters["bias"] / 2e-5 for k in range(100)]
+    assert 10 < sum(ratio < 0.1 for ratio in ratios) < 50 and 10 < sum(ratio > 10 for ratio in ratios) < 50
 
 
 def test_an_llm_that_never_answers_validly_is_given_up() -> None:

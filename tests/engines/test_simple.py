@@ -11,6 +11,7 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.stl import Verdict
 from falsifier.testing import START, drive, lag_problem
 from tests.engines.support import box_problem
+from tests.problems import decades
 
 
 def test_uniform_points_fill_the_box_alone_or_in_batches() -> None:
@@ -20,6 +21,12 @@ def test_uniform_points_fill_the_box_alone_or_in_batches() -> None:
     assert points.min() < -0.975 and points.max() > 0.975
     one, other = (make_engine("uniform", problem, seed=7) for _ in range(2))
     assert [c.key for c in one.ask(3)] == [c.key for _ in range(3) for c in other.ask()]
+
+
+def test_uniform_values_are_even_in_the_decades_of_a_range() -> None:
+    asked = make_engine("uniform", decades(), seed=0).ask(700)
+    counts, _ = np.histogram(np.log10([c.parameters["bias"] for c in asked]), bins=7, range=(-7, 0))
+    assert counts.min() > 70 and counts.max() < 130
 
 
 def test_corners_come_first_and_each_once() -> None:

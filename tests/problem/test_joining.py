@@ -2,6 +2,7 @@
 
 import copy
 import re
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,25 @@ def test_what_the_spec_says_is_completed_from_the_fmu() -> None:
     assert [(p.name, p.low, p.nominal) for p in found.space.parameters] == [("finalDrive", 3.0, 3.23)]
     assert (found.experiment.stop_time, found.experiment.output_interval) == (40.0, 0.01)
     assert (found.requirement.name, found.requirement.description) == ("R", "slow")
+
+
+def test_a_parameter_may_be_searched_in_decades_and_nothing_else() -> None:
+    def searched(**options: Any) -> list[tuple[str, float, str]]:
+        found = joined(options=options).space.parameters
+        return [(p.name, p.low, p.scale) for p in found]
+
+    assert searched(ranges=["finalDrive=3:3.5:log"]) == [("finalDrive", 3.0, "log")]
+    assert searched() == [("finalDrive", 3.0, "linear")]
+    scaled = copy.deepcopy(SPEC)
+    scaled["parameters"]["finalDrive"] = {"range": [3.0, 3.5], "scale": "log"}
+    narrower = changes_from(parameters={"finalDrive": (3.1, 3.2)})
+    (p,) = join(parse_spec(scaled, file="my.toml"), "R", path=FILE, changes=narrower).space.parameters
+    assert (p.low, p.scale) == (3.1, "log")
+    with pytest.raises(SpecError, match="throttle: is an input: only parameters can have a scale"):
+        joined(options={"ranges": ["throttle=1:100:log"]})
+    scaled["parameters"] = {"rollingLoad": {"range": [0, 40], "scale": "log"}}
+    with pytest.raises(SpecError, match=r'parameters\.rollingLoad: .*scale "log" needs low > 0'):
+        join(parse_spec(scaled, file="my.toml"), "R", path=FILE)
 
 
 def test_requirement_then_profile_then_option_override_the_spec() -> None:
@@ -162,6 +182,28 @@ def test_a_range_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> N
         changes = changes_from(parameters={"h": (0, high)})
         found = join_formula(ball, RequirementSection(formula="G (h <= 9)"), changes=changes).notes
         assert [n.partition(", not")[0] for n in found if "outside" in n] == told
+
+
+def test_a_value_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> None:
+    old, new = b'unit="m" start="1.0"', b'unit="K" displayUnit="degC" start="293.15"'
+    ball = altered(fixture("Ball_2"), tmp_path / "ball.fmu", lambda text: text.replace(old, new))
+    note = "h: 20 degC would be nearer to its start value, 293.15 K; all numbers are in K, not in degC"
+    for value, told in ((300, []), (350, []), (20, [note])):
+        changes = changes_from(parameters={"h": value})
+        found = join_formula(ball, RequirementSection(formula="G (h <= 9)"), changes=changes, searches=False)
+        assert [n.partition(", in which")[0] for n in found.notes if "degC" in n] == told
+
+
+def test_a_start_value_outside_of_the_model_s_own_limits_can_be_stated_again() -> None:
+    h = Variable("h", causality="parameter", low=2.0, high=5.0, start=1.0, settable=True)
+    for value in (1.0, 1.5):
+        given = changes_from(parameters={"h": value})
+        space = partial(search_space, {}, given.parameters, ModelInfo("M", variables=(h,)), 1.0, given)
+        if value == h.start:
+            assert space()[1] == {"h": 1.0}
+        else:
+            with pytest.raises(SpecError, match=r"1\.5 exceeds the model's limits for 'h', \[2, 5\]"):
+                space()
 
 
 def test_inputs_that_need_only_be_named_are_told() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from falsifier.cli.options import problem_source, requirement_options
 from falsifier.errors import SpecError
-from falsifier.problem.sections import InputSection
+from falsifier.problem.sections import InputSection, ParameterSection
 from falsifier.problem.shorthand import changes_from, changes_from_options, options_from, without_option
 
 
@@ -35,6 +35,7 @@ def test_options_that_cannot_be_read_are_named(option: str, message: str) -> Non
     [
         {"ranges": ["u=0:1:3"], "stop_time": 5.0},
         {"ranges": ["u=-0.1:0.3:3:linear", "w", "q=0:0.1", "m=Off:Lock:3"], "values": ["p=1e-07", "v=On"]},
+        {"ranges": ["p=1e-06:0.1:log", "q=0:1", "r=1:2:linear"], "values": ["s=1"]},
         {"interface": "model-exchange", "output_interval": 0.01},
         {"allow": ["write:/tmp", "programs"], "deny": ["network"]},
         {},
@@ -61,6 +62,9 @@ def test_a_section_says_all_that_a_spec_can() -> None:
     changes = changes_from(inputs={"u": section}, parameters={})
     assert changes.inputs["u"] == section
     assert without_option(changes) == ["inputs.u.control_points", "inputs.u.hold"]
+    scaled = changes_from(parameters={"p": ParameterSection(scale="log"), "q": (1, 2, "log")})
+    assert without_option(scaled) == ["parameters.p.scale"]
+    assert options_from(scaled)[1] == ("--search", "q=1:2:log")
 
 
 @pytest.mark.parametrize(
@@ -69,6 +73,8 @@ def test_a_section_says_all_that_a_spec_can() -> None:
         ({"ranges": ["u=0:1:3", "v", "u"]}, "--search u: given twice"),
         ({"values": ["p=1", "p=2"]}, "--set p: given twice"),
         ({"values": ["p=1"], "ranges": ["p=0:1"]}, "p: --set keeps it constant, --search varies it"),
+        ({"values": ["p=1"], "ranges": ["p=1:2:log"]}, "p: --set keeps it constant, --search varies it"),
+        ({"ranges": ["p=1:0:log"]}, r"--search p: expected \[low, high\] with low < high"),
     ],
 )
 def test_a_name_is_given_once(options: dict[str, Any], message: str, at_the_command_line: None) -> None:
@@ -85,7 +91,7 @@ def test_a_name_is_given_once(options: dict[str, Any], message: str, at_the_comm
         ({"inputs": {"u": {0, 100}}}, "inputs.u: .*got "),
         ({"inputs": {"u": (1,)}}, "inputs.u: "),
         ({"inputs": {"u": (0, 1, 2, "linear", 4)}}, "inputs.u: "),
-        ({"parameters": {"p": (0, 1, 2)}}, "parameters.p: "),
+        ({"parameters": {"p": (0, 1, 2)}}, "parameters.p.scale: expected 'linear' or 'log', got 2"),
         ({"parameters": {"p": (1,)}}, r"parameters.p: .*ParameterSection or None, got \(1,\)"),
         ({"inputs": {"u": (0, [1])}}, r"inputs.u.range, entry 2: expected a number or text, got \[1\]"),
         ({"parameters": {"p": 10**400}}, "parameters.p.value: expected a finite number, got 10"),

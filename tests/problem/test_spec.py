@@ -47,6 +47,9 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("inputs.u.free", {"max_control_points": 3}, r"inputs\.u\.free\.min_interval: this key is missing"),
         ("model.interface", "cs", r"model\.interface: .*'co-simulation' or 'model-exchange', got 'cs'$"),
         ("parameters.p", {"range": [0, 1], "value": 2}, r"parameters\.p: value fixes the parameter"),
+        ("parameters.p", {"scale": "log", "value": 2}, r".*\.p: value fixes .*, scale is how to search it"),
+        ("parameters.p.scale", "ln", r"parameters\.p\.scale: expected 'linear' or 'log', got 'ln'"),
+        ("inputs.u.scale", "log", r"inputs\.u\.scale: unknown key"),
         ("requirements", {}, r"requirements: "),
         ("requirements.R", {"tempalte": "x"}, r"requirements\.R\.tempalte: .* did you mean 'template'"),
         ("connections", {"a.b": {"source": "c.d"}}, r"connections\.a\.b\.source: unknown key; known: from,"),
@@ -118,6 +121,8 @@ def test_fixed_and_searched_replace_each_other() -> None:
     narrow = ParameterSection(range=(0, 1))
     assert overlay(ParameterSection(value=2.0), narrow) == overlay(narrow, ParameterSection()) == narrow
     assert overlay(ParameterSection(value=2.0), ParameterSection()) == ParameterSection(value=None)
+    assert overlay(ParameterSection(scale="log"), narrow) == ParameterSection(range=(0, 1), scale="log")
+    assert overlay(ParameterSection(range=(1, 2), scale="log"), ParameterSection(value=3.0)).scale is None
     bare = parse_spec(changed("parameters.mass", 3), file="my.toml")
     assert bare.parameters["mass"] == ParameterSection(value=3)
 

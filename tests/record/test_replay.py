@@ -24,21 +24,25 @@ from falsifier.search.events import Evaluated, Event
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
 from tests.patience import HANG
+from tests.problems import decades
 from tests.record.support import run
 
 PROBLEM = lag_problem("G[0,10] (x <= 2)")
 
 
-@pytest.mark.parametrize("engine", ["uniform", "corners"])
+@pytest.mark.parametrize("engine", ["uniform", "corners", "surrogate"])
 @pytest.mark.parametrize("keep", [1, 8, 17])
-def test_resume_from_any_line_gives_the_uninterrupted_run(tmp_path: Path, engine: str, keep: int) -> None:
-    whole = run(PROBLEM, tmp_path / "whole", engine=engine)
+@pytest.mark.parametrize("problem", [PROBLEM, decades("G[0,10] (x <= 2)", inputs=1)], ids=["even", "decades"])
+def test_resume_from_any_line_gives_the_uninterrupted_run(
+    tmp_path: Path, engine: str, keep: int, problem: Problem
+) -> None:
+    whole = run(problem, tmp_path / "whole", engine=engine)
     lines = (tmp_path / "whole" / "journal.jsonl").read_bytes().splitlines(keepends=True)
     cut = tmp_path / "cut"
     shutil.copytree(tmp_path / "whole", cut)
     torn = lines[keep][: len(lines[keep]) // 2]
     (cut / "journal.jsonl").write_bytes(b"".join(lines[:keep]) + torn)
-    resumed = run(PROBLEM, cut, engine=engine)
+    resumed = run(problem, cut, engine=engine)
     assert [(e.candidate.key, e.robustness) for e in resumed.evaluations] == [
         (e.candidate.key, e.robustness) for e in whole.evaluations
     ]

@@ -218,8 +218,7 @@ class Programs:
 
 def _cuts(ranged: InputRange | ParameterRange, values: Sequence[float]) -> NDArray[np.float64]:
     """Return levels as shares of a range, those at its bounds left out."""
-    width = (ranged.high - ranged.low) or 1.0
-    shares = {(value - ranged.low) / width for value in values}
+    shares = {float(ranged.share_of(value)) for value in values if ranged.low < value < ranged.high}
     return np.array(sorted(share for share in shares if 0.0 < share < 1.0))
 
 
@@ -228,4 +227,4 @@ def _levels(ranged: InputRange | ParameterRange) -> NDArray[np.float64] | None:
     width = ranged.high - ranged.low
     if ranged.kind == "real" or width > _MAX_LEVELS * 4 or len(ranged.numbers) > _MAX_LEVELS:
         return None
-    return (np.array(ranged.numbers) - ranged.low) / (width or 1.0)
+    return np.asarray(ranged.share_of(np.array(ranged.numbers)))

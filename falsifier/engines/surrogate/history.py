@@ -96,10 +96,9 @@ class History:
         inputs = []
         for r in space.inputs:
             means = candidate.signals[r.name].sample(fine).reshape(grid.all_cells, _FINE).mean(axis=1)
-            inputs.append((means - r.low) / ((r.high - r.low) or 1.0))
+            inputs.append(r.share_of(means))
         for p in space.parameters:
-            value = (candidate.parameters[p.name] - p.low) / ((p.high - p.low) or 1.0)
-            inputs.append(np.full(grid.all_cells, value))
+            inputs.append(np.full(grid.all_cells, p.share_of(candidate.parameters[p.name])))
         return Trace(np.stack(inputs, axis=1), states)
 
     @property

@@ -80,7 +80,7 @@ class PredictedCost:
         columns |= {name: np.full(states.shape[:2], value) for name, value in self.constants.items()}
         for j, r in enumerate(self.space.inputs):
             held = np.concatenate([inputs[:, :, j], inputs[:, -1:, j]], axis=1)
-            columns[r.name] = r.low + (r.high - r.low) * held
+            columns[r.name] = r.at(held)
         found: Margins = []
         with np.errstate(all="ignore"):  # what is not finite is cut by ``learnable``
             for predicate, discrete in zip(self.predicates, self.discrete, strict=True):

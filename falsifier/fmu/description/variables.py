@@ -46,7 +46,7 @@ _NO_ELEMENT = Element("none")
 _Role = tuple[Causality, str, str]
 # Why variables of these causalities cannot be set.
 _REFUSALS: Mapping[str, str] = {
-    "structuralParameter": "it is a structural parameter, which sets array sizes",
+    "structuralParameter": "it is a structural parameter; arrays have the sizes of its start value",
     "calculatedParameter": (
         "it is a calculated parameter; set the parameters from which the model calculates it"
     ),

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal, even_times
-from falsifier.core.space import InputRange
+from falsifier.core.space import Dimension, InputRange, Range
 from falsifier.llm.prompts.view import View
 from falsifier.stl.margins import is_on_limit
 
@@ -118,9 +118,15 @@ def as_signals(view: View, candidate: Candidate, *, in_brief: bool = False) -> t
         told = _signal_text_in(r, candidate.signals[r.name], view.space.stop_time, in_brief=in_brief)
         lines.append(f"{r.name}: {told}")
     for p in view.space.parameters:
-        decimals = decimals_for(p.high - p.low, _DIGITS_OF_PARAMETER)
-        lines.append(f"{p.name} = {plain(candidate.parameters[p.name], decimals)}")
+        lines.append(f"{p.name} = {chosen(p, candidate.parameters[p.name], _DIGITS_OF_PARAMETER)}")
     return tuple(lines)
+
+
+def chosen(ranged: Range | Dimension, value: float, digits: int, *, least: int = 0) -> str:
+    """A value with decimals for so many digits of its range's width; in decades, with digits of its own."""
+    if ranged.scale == "log":
+        return number(value, _DIGITS_OF_PARAMETER)
+    return plain(value, max(least, decimals_for(ranged.high - ranged.low, digits)))
 
 
 def _signal_text_in(r: InputRange, signal: Signal, stop_time: float, *, in_brief: bool) -> str:

@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import shortest
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange
+from falsifier.core.space import Dimension, InputRange, Range
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import Array
-from falsifier.llm.prompts.numbers import bounds, decimals_for, plain
+from falsifier.llm.prompts.numbers import bounds, chosen, decimals_for
 from falsifier.llm.prompts.observations import compared_columns
 from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, reply_form, requirement_text
 from falsifier.llm.prompts.view import Variant, View
@@ -79,8 +79,9 @@ def _numbers(view: View, *, named: bool) -> Iterator[str]:
         low, high = bounds(dimension.low, dimension.high)
         at = "" if dimension.time is None else f" at t = {_clock(view, dimension.time)}"
         meaning = f": {dimension.name}{at}" if named else ""
+        manner = ", searched in decades" if dimension.scale == "log" else ""
         boolean = named and ranged[dimension.name] == "boolean"
-        yield f"{i}{meaning}, {'0 (false) or 1 (true)' if boolean else f'from {low} to {high}'}"
+        yield f"{i}{meaning}, {'0 (false) or 1 (true)' if boolean else f'from {low} to {high}{manner}'}"
     for r in view.space.inputs if named else ():
         held = "" if r.hold is None else f", sampled and held every {r.hold:g} s"
         between = f"{r.name} between these times: {INTERPOLATION_WORDS[r.interpolation]}{held}"
@@ -91,7 +92,7 @@ def as_point(view: View, candidate: Candidate) -> tuple[str, ...]:
     """Return the numbers of a candidate in the order of the dimensions, as one line."""
     is_exact = all(_is_exact(view, r, candidate.signals[r.name]) for r in view.space.inputs)
     values = zip(view.space.encode(candidate), view.space.dimensions, strict=True)
-    listed = ", ".join(_rounded(float(value), d.low, d.high) for value, d in values)
+    listed = ", ".join(_rounded(float(value), d) for value, d in values)
     return (f"point = [{listed}]{'' if is_exact else _READ}",)
 
 
@@ -100,16 +101,16 @@ def as_values(view: View, candidate: Candidate) -> tuple[str, ...]:
     lines = []
     for r in view.space.inputs:
         signal = candidate.signals[r.name]
-        listed = ", ".join(_rounded(v, r.low, r.high) for v in view.space.fixed_values(r, signal))
+        listed = ", ".join(_rounded(v, r) for v in view.space.fixed_values(r, signal))
         lines.append(f"{r.name} = [{listed}]{'' if _is_exact(view, r, signal) else _READ}")
     for p in view.space.parameters:
-        lines.append(f"{p.name} = {_rounded(candidate.parameters[p.name], p.low, p.high)}")
+        lines.append(f"{p.name} = {_rounded(candidate.parameters[p.name], p)}")
     return tuple(lines)
 
 
-def _rounded(value: float, low: float, high: float) -> str:
+def _rounded(value: float, ranged: Range | Dimension) -> str:
     """A value with the published three decimals; with more only if the range is too narrow for them."""
-    return plain(value, max(_DECIMALS, decimals_for(high - low, 2)))
+    return chosen(ranged, value, 2, least=_DECIMALS)
 
 
 def _is_exact(view: View, r: InputRange, signal: Signal) -> bool:

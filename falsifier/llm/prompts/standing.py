@@ -258,7 +258,8 @@ def _values(ranged: InputRange | ParameterRange) -> str:
     if ranged.kind == "boolean":
         return "Boolean, 0 (false) or 1 (true)"
     low, high = bounds(ranged.low, ranged.high, _DIGITS_OF_BOUNDS)
-    return f"{'' if ranged.kind == 'real' else 'integers '}from {low} to {high}"
+    manner = ", searched in decades (a logarithmic scale)" if ranged.scale == "log" else ""
+    return f"{'' if ranged.kind == 'real' else 'integers '}from {low} to {high}{manner}"
 
 
 def _described(description: str) -> str:

@@ -67,10 +67,10 @@ def _plot_parameter(ax: "Axes", r: RangeCoverage) -> None:
     ends = _ends(r)
     for low, high, count in zip(ends, ends[1:], r.parts, strict=False):
         if count:
-            ax.bar((low + high) / 2, count, width=high - low, color=_TRIED, edgecolor="white")
+            ax.bar(low, count, width=high - low, align="edge", color=_TRIED, edgecolor="white")
         else:
             ax.axvspan(low, high, color=_NEVER, linewidth=0)
-    ax.set(xlabel=_label(r), ylabel="simulations", xlim=(ends[0], ends[-1]))
+    ax.set(xlabel=_label(r), ylabel="simulations", xlim=(ends[0], ends[-1]), xscale=r.searched.scale)
     _whole(ax.xaxis, r)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
 
@@ -79,6 +79,7 @@ def _plot_pair(ax: "Axes", p: PairCoverage, by_name: dict[str, RangeCoverage]) -
     first, second = by_name[p.first], by_name[p.second]
     _heat(ax, _ends(first), _ends(second), p.tried.T.astype(np.intp))
     ax.set(xlabel=_label(first), ylabel=_label(second))
+    ax.set(xscale=first.searched.scale, yscale=second.searched.scale)
     ax.set_title(f"{p.count} of {p.tried.size} combinations", fontsize=9)
     _whole(ax.xaxis, first)
     _whole(ax.yaxis, second)
@@ -144,7 +145,7 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
         right.plot(found.grid[0], found.surface[0], color=Colour.OUTPUT, linewidth=1.2)
         right.plot(coordinate.value, found.original, "o", color=colour)
         right.axhline(0, color=Colour.QUIET, linewidth=0.8, linestyle="--")
-        right.set(xlabel=caption(coordinate.label), ylabel="robustness")
+        right.set(xlabel=caption(coordinate.label), ylabel="robustness", xscale=coordinate.scale)
     fit_labels(right)
     figure.suptitle(f"{caption(title)}: robustness around the {centre}".removeprefix(": "))
     return figure
@@ -166,6 +167,6 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
     elif low < high:  # one colour: lines show which way it changes
         ax.clabel(ax.contour(*found.grid, found.surface, levels=4, colors="black", linewidths=0.5))
     ax.plot(first.value, second.value, "o", color="black", markersize=5)
-    ax.set(xlabel=caption(first.label), ylabel=caption(second.label))
+    ax.set(xlabel=caption(first.label), ylabel=caption(second.label), xscale=first.scale, yscale=second.scale)
     ticks = [ends[0], ends[0] / 2, 0.0, ends[1] / 2, ends[1]]  # on both halves, whose scales differ
     ax.figure.colorbar(mesh, ax=ax, label="robustness (red: violated)", ticks=ticks, format="%.3g")

@@ -3,9 +3,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from falsifier.errors import ModelError
+from falsifier.errors import ModelError, SpecError
 from falsifier.fmu import read_info
 from falsifier.fmu.description.model_description import Description, parse, read_description
+from falsifier.problem.ranges import search_space
+from falsifier.problem.shorthand import changes_from
 from tests.fmu import fixtures
 
 ALL = sorted(p.stem for p in fixtures.FOLDER.glob("*.fmu"))
@@ -98,7 +100,9 @@ def test_array_sizes_from_structural_parameters_and_aliases() -> None:
     assert names == ["n", "x[1]", "x[2]", "x[3]", "state[1]", "state[2]", "state[3]", "i"]
     assert description.slots["state[2]"].reference == 1
     assert description.arrays[1] == (7.0, 7.0, 7.0)
-    assert "structural parameter" in description.info["n"].refusal
+    changes = changes_from(parameters={"n": (1, 5)})
+    with pytest.raises(SpecError, match="structural parameter; arrays have the sizes of its start value"):
+        search_space({}, changes.parameters, description.info, 1.0, changes)
     assert description.info.internal_step == 0.25 and not description.info.notes
 
 

@@ -24,6 +24,7 @@ from falsifier.problem.loading import load_problem
 from falsifier.stl import parse
 from falsifier.testing import FREE, START, lag_problem
 from tests.llm.prompts.support import told, transmission
+from tests.problems import decades
 
 
 def standing(problem: Any, variant: str = "MP5", **more: Any) -> str:
@@ -109,6 +110,16 @@ def test_parameters_are_plain_numbers() -> None:
     assert "- start value x; from -0.5 to 0.5; one value at t = 0\n" in standing(moving)
     assert "Output signals: x\n" in standing(moving, "MP4")
     assert "Output signals: p1\n" in standing(Disguise.of(View.of(moving)).view, "MP4")
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_a_range_in_decades_is_told_as_one_wherever_it_is_stated(variant: str) -> None:
+    problem = decades()
+    for view in (problem, Disguise.of(View.of(problem)).view):
+        assert "from 1e-07 to 1, searched in decades" in standing(view, variant)
+    _, changing = told(problem, variant, [evaluate(problem, Candidate({}, {"bias": 2.3456e-5}))])
+    assert "2.3456e-05" in changing
+    assert "decades" not in standing(decades(scale="linear"), variant)
 
 
 def kind_of_input(variant: str, **changes: Any) -> str:

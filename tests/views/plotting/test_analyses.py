@@ -39,6 +39,15 @@ def test_there_is_a_panel_of_each_input_parameter_pair_and_output() -> None:
     assert figure.get_suptitle() == "A: what 2 simulations tried (red: never)"
 
 
+def test_axes_of_ranges_in_decades_are_logarithmic() -> None:
+    p, q = (Range(name=name, low=1e-8, high=100.0, scale="log") for name in "pq")
+    candidate = Candidate({}, {"p": 1e-3, "q": 1.0})
+    figure = plot_coverage(coverage_of(described(parameters=(p, q)), [(candidate, None)]))
+    scales = [(ax.get_xscale(), ax.get_yscale()) for ax in figure.axes[:3]]
+    assert scales == [("log", "linear"), ("log", "linear"), ("log", "log")]
+    assert png(figure, dpi=50)
+
+
 def test_red_is_what_was_never_tried() -> None:
     halves = Range(name="u", low=0, high=1, kind="boolean")
     one = Candidate({"u": Signal((0.0,), (1.0,), "constant")})
