@@ -4,6 +4,7 @@ import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import StringIO
 from itertools import pairwise
 from math import nextafter
 from pathlib import Path
@@ -15,6 +16,10 @@ from falsifier.errors import SpecError, did_you_mean, in_section
 from falsifier.problem.unit_check import spelled
 from falsifier.stl.lexer import UNITS
 
+# The first name of a table, quoted or not, and what separates it from the next one.
+_SEPARATED = re.compile(r'\s*(?:"[^"]*"|[^",;\t]*)([,;\t])')
+# Numbers with decimal commas, as German spreadsheets write them, and a number with a point.
+_WITH_COMMA, _WITH_POINT = re.compile(r"[-+\deE, ]*\d,\d[-+\deE, ]*"), re.compile(r"[-+\deE]*\.[-+\deE]*")
 # The unit at the end of the name of a column, such as "t [ms]", "Time (min)" or "time_ms".
 _UNIT = re.compile(r"[\[(/_ ]\s*(\w+)\s*[\])]?$")
 
@@ -33,7 +38,8 @@ def read_inputs(path: Path, info: ModelInfo) -> InputFile:
 
     The first row has the names. The first column is the time in s, from 0 on; a repeated time is a step. Each
     further column is one input, linear between two rows; inputs that are not real hold their values, also
-    given by the names of items. An array may be one column, with spaces between its elements.
+    given by the names of items. An array may be one column, with spaces between its elements. Columns may
+    also be separated by semicolons or tabs, and then have decimal commas.
 
     Raises:
         SpecError: naming the file, the row or column and what is wrong.
@@ -45,11 +51,29 @@ def read_inputs(path: Path, info: ModelInfo) -> InputFile:
 def csv_rows(path: Path) -> list[tuple[int, list[str]]]:
     """Return the rows of a CSV file that are not empty, numbered from 1; SpecError if it is none."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            return [(n, row) for n, row in enumerate(csv.reader(file), 1) if any(c.strip() for c in row)]
+        text = path.read_text(encoding="utf-8-sig")
+        mark = found[1] if (found := _SEPARATED.match(text)) else ","
+        lines = enumerate(csv.reader(StringIO(text), delimiter=mark), 1)
+        rows = [(n, row) for n, row in lines if any(c.strip() for c in row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else "expected a CSV file in UTF-8"
         raise SpecError(f"cannot be read: {reason}", file=str(path)) from None
+    with in_section(file=str(path)):
+        return rows if mark == "," else _with_points(rows)
+
+
+def _with_points(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """Return the rows with points in place of decimal commas; SpecError if there are both."""
+    if not any(_WITH_COMMA.fullmatch(cell) for _, row in rows[1:] for cell in row):
+        return rows
+    for n, row in rows[1:]:
+        if pointed := next((cell for cell in row if _WITH_POINT.fullmatch(cell.strip())), None):
+            raise SpecError(
+                f"row {n}: {pointed!r} has a point, other numbers have decimal commas: write all in one way, "
+                "without marks between thousands"
+            )
+        row[:] = [cell.replace(",", ".") if _WITH_COMMA.fullmatch(cell) else cell for cell in row]
+    return rows
 
 
 def _read(rows: Sequence[tuple[int, list[str]]], info: ModelInfo) -> InputFile:
@@ -57,11 +81,6 @@ def _read(rows: Sequence[tuple[int, list[str]]], info: ModelInfo) -> InputFile:
     if len(rows) < 2:
         raise SpecError("expected a row of names and one or more rows of numbers")
     header = [cell.strip() for cell in rows[0][1]]
-    if other := next((mark for mark in ";\t" if mark in header[0]), None):
-        raise SpecError(
-            f"expected commas between the columns, got {other!r}: export it with commas, and numbers with "
-            "decimal points"
-        )
     role = info[header[0]].causality if header[0] in info else "independent"
     if header[0].lower() not in ("t", "time") and role != "independent":
         raise SpecError(f"the first column must be the time in s, got the {role} {header[0]!r}")

@@ -60,6 +60,21 @@ def test_arrays_marked_names_and_outputs_are_understood(tmp_path: Path) -> None:
     assert found.unused == ("speed",)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "t;u;w\r\n0;1,5;1 2\r\n1;-2,5E-1;1,5 2\r\n",
+        '\ufeff"t"\tu\tw\n0\t1.5\t1 2\n1\t-0.25\t1.5 2\n',
+        "t;w;u\n0;1 2;1.5\n1;1.5 2;-.25\n",
+    ],
+)
+def test_spreadsheets_separate_columns_and_write_decimals_as_their_country_does(
+    text: str, tmp_path: Path
+) -> None:
+    signals = read_inputs(written(tmp_path, text), INFO).signals
+    assert {n: s.values for n, s in signals.items()} == {"u": (1.5, -0.25), "w[1]": (1, 1.5), "w[2]": (2,)}
+
+
 @pytest.mark.parametrize("name", ["", "Time [s]", "Zeit/sec", "time_s", "Time (since start)", "x"])
 def test_the_time_may_have_any_name_that_states_no_other_unit(name: str, tmp_path: Path) -> None:
     variables = (*INFO.variables, Variable("x", causality="independent"))
@@ -70,8 +85,9 @@ def test_the_time_may_have_any_name_that_states_no_other_unit(name: str, tmp_pat
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("time;u\n0;1,5\n", "expected commas between the columns, got ';': .* decimal points"),
-        ("t;u, measured;gear\n0;1;1\n", "expected commas between the columns, got ';'"),
+        ("t;u\n0;1,5\n1;1.234\n", "row 3: '1.234' has a point, other numbers have decimal commas"),
+        ("t;u\n0;1.234,5\n", "row 2, column u: expected a number, got '1.234,5'"),
+        ("t,u\n0,1,5\n", "row 2: 3 cells, expected 2"),
         ("", "a row of names"),
         ("t,throtle\n0,1\n", "column 'throtle'"),
         ("t,speed\n0,1\n", "no column is an input"),
