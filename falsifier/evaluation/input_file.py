@@ -15,8 +15,8 @@ from falsifier.errors import SpecError, did_you_mean, in_section
 from falsifier.problem.unit_check import spelled
 from falsifier.stl.lexer import UNITS
 
-# The unit at the end of the name of a column, such as "t [ms]", "Time (min)" or "time_ms".
-_UNIT = re.compile(r"[\[(/_ ]\s*(\w+)\s*[\])]?$")
+# The last word of the name of a column, such as "t [ms]", "time_min", "Time.h" or "ms".
+_UNIT = re.compile(r"([^\W_]+)\W*$")
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,7 +60,9 @@ def test_arrays_marked_names_and_outputs_are_understood(tmp_path: Path) -> None:
     assert found.unused == ("speed",)
 
 
-@pytest.mark.parametrize("name", ["", "Time [s]", "Zeit/sec", "time_s", "Time (since start)", "x"])
+@pytest.mark.parametrize(
+    "name", ["", "Time [s]", "Zeit/sec", "time_s", "Time (since start)", "x", "t_1", "Timestamp"]
+)
 def test_the_time_may_have_any_name_that_states_no_other_unit(name: str, tmp_path: Path) -> None:
     variables = (*INFO.variables, Variable("x", causality="independent"))
     found = read_inputs(written(tmp_path, f"{name},u\n0,1\n2,1\n"), ModelInfo("plant", variables=variables))
@@ -81,6 +83,8 @@ def test_the_time_may_have_any_name_that_states_no_other_unit(name: str, tmp_pat
         ("t [ms],u\n0,1\n", r"the time must be in s, got 't \[ms\]': multiply it by 0.001"),
         ("Zeit (Minutes),u\n0,1\n", "multiply it by 60"),
         ("time_h,u\n0,1\n", "multiply it by 3600"),
+        ("Time.ms,u\n0,1\n", "multiply it by 0.001"),
+        ("min,u\n0,1\n", "multiply it by 60"),
         ("t/µs,u\n0,1\n", "multiply it by 0.000001"),
         ("t,u\n0,1\n1\n", "row 3: 1 cells, expected 2 as in row 1"),
         ("t,u\n0,1\n1,high\n", "row 3, column u: expected a number, got 'high'"),
