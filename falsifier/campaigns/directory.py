@@ -17,8 +17,8 @@ from falsifier.campaigns.request import CampaignRequest
 from falsifier.core.literals import shell_word
 from falsifier.errors import JournalError
 from falsifier.record.files import CAMPAIGN, is_locked, locked, make_folder, read_sealed, write_sealed
-from falsifier.record.journal import holds_run, runs_below
-from falsifier.record.manifest import Surroundings
+from falsifier.record.journal import holds_run
+from falsifier.record.manifest import Surroundings, runs_below
 
 _LOCK = "lock"
 # Time in s to wait for the lock: is_worked_on() holds it for a moment.

@@ -54,16 +54,18 @@ def new_directory(name: str) -> Path:
     Tasks of a job array start at the same moment: only who has made a folder knows that it is nobody else's.
     """
     base = Path("runs") / f"{file_name(name)}-{datetime.now():%Y%m%d-%H%M%S}"
+    is_first = not base.parent.exists()
     make_folder(base.parent)
     for place in chain([base], (base.with_name(f"{base.name}-{i}") for i in count(2))):
         with suppress(FileExistsError):
-            place.mkdir()
+            place.mkdir(parents=True)  # another task that ends may just have removed ``runs/``
             break
 
     def tidy() -> None:
         with suppress(OSError):
             place.rmdir()
-            place.parent.rmdir()
+            if is_first:
+                place.parent.rmdir()
 
     click.get_current_context().call_on_close(tidy)
     return place

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from math import ceil, inf, isfinite
+from math import ceil, inf, isfinite, ulp
 from typing import Literal, get_args
 
 import numpy as np
@@ -146,7 +146,8 @@ class Signal:
     @property
     def shortest_dwell(self) -> float | None:
         """Shortest time in s between two changes of value, steps counted as one; None with fewer than two."""
-        return min((b - a for a, b in pairwise(self.switch_times) if b - a > 2.0 * STEP_RAMP), default=None)
+        pairs = pairwise(self.switch_times)
+        return min((b - a for a, b in pairs if b - a > 2.0 * max(STEP_RAMP, ulp(b))), default=None)
 
 
 @lru_cache(maxsize=256)

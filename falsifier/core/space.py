@@ -80,8 +80,8 @@ class Range:
                 raise SpecError(f'{what}: only real parameters can have scale "log"; leave it out')
             if low <= 0:
                 raise SpecError(
-                    f'{what}: scale "log" needs low > 0, got [{low:.12g}, {high:.12g}]; raise low, or leave '
-                    "scale out"
+                    f'{what}: scale "log" needs low > 0, got [{low:.12g}, {high:.12g}]; raise low, or make '
+                    'scale "linear"'
                 )
         if self.kind == "real":
             return

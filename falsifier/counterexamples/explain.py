@@ -137,9 +137,8 @@ class Explanation:
         if effect.is_rest:
             return f"{'at rest' if isinstance(ranged, InputRange) else 'at its nominal value'} ({number})"
         is_between = ranged.low < effect.instead < ranged.high
-        middle = (
-            f"{'at' if effect.instead == ranged.at(0.5) else 'near'} the middle of its range{ranged.manner}"
-        )
+        near = "at" if effect.instead == ranged.at(0.5) else "near"
+        middle = f"{near} the middle of its range{ranged.manner}"
         return f"{middle if is_between else 'at an end of its range'} ({number})"
 
 

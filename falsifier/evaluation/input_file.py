@@ -20,8 +20,8 @@ from falsifier.stl.lexer import UNITS
 _SEPARATED = re.compile(r'\s*(?:"[^"]*"|[^",;\t]*)([,;\t])')
 # Numbers with decimal commas, as German spreadsheets write them, and a number with a point.
 _WITH_COMMA, _WITH_POINT = re.compile(r"[-+\deE, ]*\d,\d[-+\deE, ]*"), re.compile(r"[-+\deE]*\.[-+\deE]*")
-# The unit at the end of the name of a column, such as "t [ms]", "Time (min)" or "time_ms".
-_UNIT = re.compile(r"[\[(/_ ]\s*(\w+)\s*[\])]?$")
+# The last word of the name of a column, such as "t [ms]", "time_min", "Time.h" or "ms".
+_UNIT = re.compile(r"([^\W_]+)\W*$")
 
 
 @dataclass(frozen=True, slots=True)

@@ -246,9 +246,10 @@ def _range(option: str) -> tuple[str, InputChoice]:
         return name, None
     try:
         low, high, *more = (part.strip() for part in said.split(":"))
-        points = [number if number in get_args(Scale) else int(number) for number in more[:1]]
+        is_scaled = more[:1] and more[0] in get_args(Scale)
+        points = more[:1] if is_scaled else map(int, more[:1])
         choice: Any = (_end(low), _end(high), *points, *more[1:])
-        if name and low and high and len(choice) <= 4:
+        if name and low and high and len(more) <= (1 if is_scaled else 2):
             return name, choice
     except ValueError:  # of the points, or because there is no colon
         pass

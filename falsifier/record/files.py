@@ -168,7 +168,7 @@ def check_unused(directory: Path) -> None:
     with can_be_a_folder(directory):
         for path in directory.iterdir() if directory.exists() else ():
             full = next(path.iterdir(), None) if path.is_dir() else path.lstat().st_size
-            if full and path.suffix != ".partial":  # of write_whole
+            if full and not path.match("*.json.*.partial"):  # of write_whole
                 other = f"choose another {written('--out', 'directory')}, new or empty"
                 raise JournalError(f"{directory} has files, which are kept: {other}")
 

@@ -199,13 +199,6 @@ def holds_run(directory: Path) -> bool:
         return (directory / manifest.MANIFEST).exists()
 
 
-def runs_below(directory: Path) -> list[Path]:
-    """Return the run directories in a folder, in order; those of a spec's groups are a folder deeper."""
-    found = sorted(directory.glob("*"))
-    below = (p for each in found for p in ([each] if holds_run(each) else sorted(each.glob("*"))))
-    return list(filter(holds_run, below))
-
-
 def check_new(directory: Path, resume: str = "") -> None:
     """Check that a directory has no campaign, no run and nothing else in it; JournalError if it has.
 

@@ -157,10 +157,14 @@ def read(directory: Path) -> Manifest:
 
 def check_no_folder(directory: Path) -> None:
     """Refuse a folder of runs, or a campaign's, where a run is expected; JournalError naming some of them."""
-    found = (path for pattern in ("*", "*/*") for path in directory.glob(f"{pattern}/{MANIFEST}"))
-    below = sorted(str(path.parent) for path in found)
-    if below and not (directory / MANIFEST).exists():
+    if not (directory / MANIFEST).exists() and (below := list(map(str, runs_below(directory)))):
         raise JournalError(f"{directory} is a folder of runs; give one of them: {first_few(below, _NAMED)}")
+
+
+def runs_below(directory: Path) -> list[Path]:
+    """Return the run directories in a folder, in order; those of a spec's groups are a folder deeper."""
+    found = [path.parent for pattern in ("*", "*/*") for path in directory.glob(f"{pattern}/{MANIFEST}")]
+    return sorted(found)
 
 
 def check_in_sight(place: Path, sources: Iterable[ProblemSource], remedy: str = _GO_THERE) -> None:

@@ -25,7 +25,7 @@ from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
 from falsifier.record.files import CAMPAIGN, check_unused
-from falsifier.record.journal import JOURNAL, STOP, check_new, holds_run, open_journal, runs_below, simulated
+from falsifier.record.journal import JOURNAL, STOP, check_new, holds_run, open_journal, simulated
 from falsifier.record.records import EndedRecord
 from falsifier.record.replay import replayed
 from falsifier.search.budget import Budget, budget_of
@@ -222,7 +222,7 @@ def runs_in(directory: Path) -> list[Path]:
     """Return a run directory, or those in a folder; JournalError if they are not of one spec and its FMUs."""
     if (directory / CAMPAIGN).exists():
         raise JournalError(f"{directory} is a campaign: resume_campaign({str(directory)!r}) continues it")
-    found = [directory] if holds_run(directory) else runs_below(directory)
+    found = [directory] if holds_run(directory) else manifest.runs_below(directory)
     known = [hashes for place in found if (hashes := manifest.read(place).hashes)]  # none if made in Python
     if any(hashes != known[0] for hashes in known):
         manifest.check_no_folder(directory)

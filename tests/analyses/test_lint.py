@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from falsifier.analyses.lint import lint, static_findings, unmoved_findings
 from falsifier.cli.requirements import check
 from falsifier.core.files import bundled
+from falsifier.core.space import ParameterRange, Scale
 from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource
 from falsifier.testing import BIAS, Array, lag_problem
@@ -130,6 +131,17 @@ def test_what_no_input_moves_is_measured_and_says_so() -> None:
     assert found.text.startswith("measured: 3 random simulations had the same x; the FMU does not declare")
     assert not list(unmoved_findings([lag_problem()], 3))
     assert not list(unmoved_findings([lag_problem(response=still)], 0))
+
+
+def test_what_only_the_low_decades_move_is_seen() -> None:
+    def low(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+        return {"x": np.full(times.shape, min(parameters["bias"], 1e-4))}
+
+    counts: dict[Scale, int] = {"linear": 1, "log": 0}
+    for scale, count in counts.items():
+        bias = ParameterRange("bias", 1e-7, 1.0, scale=scale)
+        problem = lag_problem("G[0,5] (x <= 9)", inputs=0, parameters=[bias], response=low)
+        assert len(list(unmoved_findings([problem], 5))) == count
 
 
 def test_what_the_fmu_declares_counts_unless_a_simulation_contradicts_it(tmp_path: Path) -> None:

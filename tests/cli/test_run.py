@@ -57,6 +57,27 @@ def test_tasks_that_start_at_the_same_moment_have_a_directory_each(
     assert list(Path("runs").iterdir()) == [places[1]]
 
 
+@pytest.mark.parametrize("was_there", [True, False])
+def test_an_empty_folder_of_runs_goes_only_if_the_command_has_made_it(
+    was_there: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if was_there:
+        Path("runs").mkdir()
+    with click.Context(cli):
+        new_directory("AT1")
+    assert list(tmp_path.glob("**/*")) == [tmp_path / "runs"] * was_there
+
+
+def test_a_folder_of_runs_that_another_task_removes_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("falsifier.cli.files.make_folder", lambda _: None)
+    with click.Context(cli):
+        assert new_directory("AT1").is_dir()
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

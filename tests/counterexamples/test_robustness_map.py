@@ -60,6 +60,20 @@ def test_changes_of_a_range_in_decades_are_shares_of_its_decades() -> None:
     assert plot_robustness_map(found).axes[1].get_xscale() == "log"
 
 
+def test_each_axis_of_a_map_has_the_scale_of_its_range() -> None:
+    bias = ParameterRange("bias", 1e-7, 1.0, scale="log")
+    mixed = lag_problem("G[0,10] (x <= 9)", inputs=0, parameters=(X0, bias))
+    found = robustness_map(mixed, evaluate(mixed, mixed.space.decode([0.3, 1e-5])), radius=0.1, budget=60)
+    x0, moved = found.values[:, 0] - 0.3, np.log10(found.values[:, 1] / 1e-5)
+    np.testing.assert_allclose(found.sizes, np.maximum(np.abs(x0) / 2, np.abs(moved) / 7), atol=1e-12)
+    drawn = plot_robustness_map(found).axes[1]
+    names = [found.coordinates[i].name for i in found.axes]
+    assert dict(zip(names, (drawn.get_xscale(), drawn.get_yscale()), strict=True)) == {
+        "x0": "linear",
+        "bias": "log",
+    }
+
+
 def test_a_margin_of_nothing_is_shown_as_everywhere_else() -> None:
     found = robustness_map(problem(), at(problem(), 0.54, 0.0), budget=20)
     on = replace(found, original=on_limit("<="), robustness=np.full_like(found.robustness, on_limit("<=")))

@@ -39,7 +39,7 @@ def test_a_repeated_time_is_a_step_with_the_later_value(tmp_path: Path) -> None:
     assert sloped.sample(np.array([1.0, 1.99, 2.0, 3.0])) == pytest.approx([1, 1.99, 9, 10])
 
 
-@pytest.mark.parametrize("time", [0.01, 2.0, 3.2e7])
+@pytest.mark.parametrize("time", [0.01, 2.0, 3.2e7, 1e12])
 def test_a_step_between_slopes_is_one_at_any_time(time: float, tmp_path: Path) -> None:
     text = f"t,u\n0,0\n{time!r},2\n{time!r},9\n{2 * time!r},11\n{4 * time!r},2\n"
     signal = read_inputs(written(tmp_path, text), INFO).signals["u"]
@@ -75,7 +75,9 @@ def test_spreadsheets_separate_columns_and_write_decimals_as_their_country_does(
     assert {n: s.values for n, s in signals.items()} == {"u": (1.5, -0.25), "w[1]": (1, 1.5), "w[2]": (2,)}
 
 
-@pytest.mark.parametrize("name", ["", "Time [s]", "Zeit/sec", "time_s", "Time (since start)", "x"])
+@pytest.mark.parametrize(
+    "name", ["", "Time [s]", "Zeit/sec", "time_s", "Time (since start)", "x", "t_1", "Timestamp"]
+)
 def test_the_time_may_have_any_name_that_states_no_other_unit(name: str, tmp_path: Path) -> None:
     variables = (*INFO.variables, Variable("x", causality="independent"))
     found = read_inputs(written(tmp_path, f"{name},u\n0,1\n2,1\n"), ModelInfo("plant", variables=variables))
@@ -97,6 +99,8 @@ def test_the_time_may_have_any_name_that_states_no_other_unit(name: str, tmp_pat
         ("t [ms],u\n0,1\n", r"the time must be in s, got 't \[ms\]': multiply it by 0.001"),
         ("Zeit (Minutes),u\n0,1\n", "multiply it by 60"),
         ("time_h,u\n0,1\n", "multiply it by 3600"),
+        ("Time.ms,u\n0,1\n", "multiply it by 0.001"),
+        ("min,u\n0,1\n", "multiply it by 60"),
         ("t/µs,u\n0,1\n", "multiply it by 0.000001"),
         ("t,u\n0,1\n1\n", "row 3: 1 cells, expected 2 as in row 1"),
         ("t,u\n0,1\n1,high\n", "row 3, column u: expected a number, got 'high'"),

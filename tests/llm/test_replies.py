@@ -297,6 +297,11 @@ def test_any_text_gives_candidates_or_says_what_is_wrong(text: str) -> None:
 def test_a_value_beyond_its_range_by_a_rounding_is_clamped() -> None:
     found = read({"point": [100.05, 0, -0.05, 0, 325, 1100.1]})
     assert found.key == read({"point": [100, 0, 0, 0, 325, 1100]}).key
+    decades = ReplyForm(SearchSpace((), (ParameterRange("leak", 1e-6, 1.0, scale="log"),), 10.0))
+    (clamped,) = decades.read('{"point": [9.9e-7]}', origin="me")
+    assert clamped.parameters["leak"] == 1e-6
+    with pytest.raises(RejectedReplyError, match="outside its range"):  # a rounding of the width of all
+        decades.read('{"point": [0]}', origin="me")
 
 
 ROWS = re.findall(

@@ -21,6 +21,7 @@ from falsifier.problem.shorthand import changes_from, changes_from_options, opti
         ("throttle=-5..5", "expected NAME=LOW:HIGH"),
         ("throttle=0:1:many", "expected NAME=LOW:HIGH"),
         ("throttle=0:1:3:linear:5", "expected NAME=LOW:HIGH"),
+        ("mass=1:9:log:pchip", "or of a parameter NAME=LOW:HIGH:log"),
         ("throttle=0:1:3:cubic", "expected 'pchip', 'linear' or 'constant', got 'cubic'"),
         ("throttle=1:0:3", "low < high"),
     ],

@@ -2,7 +2,9 @@
 
 import errno
 import os
+from contextlib import ExitStack
 from pathlib import Path
+from threading import Timer
 from unittest.mock import Mock
 
 import pytest
@@ -15,6 +17,7 @@ from falsifier.record.run import falsify
 from falsifier.search.result import Result
 from falsifier.views.report.page import html_report
 from tests.hostile.test_damage import Standing
+from tests.patience import HANG
 from tests.problems import impossible
 from tests.record.test_summary import evaluated
 
@@ -89,6 +92,20 @@ def test_a_run_that_was_killed_before_its_manifest_was_complete_is_begun_again(t
     (tmp_path / "lock").touch()
     falsify(impossible(), "uniform", budget=1, directory=tmp_path)
     assert not list(tmp_path.glob("*.partial"))
+
+
+def test_what_users_call_partial_is_kept(tmp_path: Path) -> None:
+    (tmp_path / "film.mp4.partial").write_text("half")
+    with pytest.raises(JournalError, match="has files, which are kept"):
+        falsify(impossible(), "uniform", budget=1, directory=tmp_path)
+
+
+def test_a_lock_is_waited_for_as_long_as_patience_lasts(tmp_path: Path) -> None:
+    first = ExitStack()
+    first.enter_context(journal.run_lock(tmp_path))
+    Timer(0.2, first.close).start()
+    with journal.run_lock(tmp_path, patience=HANG):
+        pass
 
 
 @pytest.mark.parametrize("damage", ["changed", "missing"])

@@ -13,7 +13,7 @@ from falsifier.testing import lag_problem
 from falsifier.views.notebook import register
 from falsifier.views.plotting import plot
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
-from tests.problems import hard, impossible
+from tests.problems import decades, hard, impossible
 
 
 class Notebook:
@@ -45,6 +45,7 @@ def test_a_problem_shows_its_formula_escaped_and_what_is_searched(notebook: Note
     assert all(name in html for name in hard().space.names)
     whole = lag_problem(parameters=[ParameterRange("x0", 1234567000, 1234567999)])
     assert "1234567000 to 1234567999" in notebook.html(whole)
+    assert "1e-07 to 1 in decades" in notebook.html(decades())
 
 
 def test_figures_are_drawn_also_without_pyplot(notebook: Notebook) -> None:

@@ -90,10 +90,9 @@ def _listed(title: str, lines: Iterable[str]) -> list[str]:
 def _environment(side: Side) -> str:
     if not side.runs:
         return "No run has started yet."
-    told: dict[str, None] = {}  # runs of several machines may differ
-    for manifest in (run.manifest for run in side.runs):
-        packages = ", ".join(f"{name} {version}" for name, version in manifest.packages.items())
-        told[f"falsifier {manifest.falsifier}, Python {manifest.python}, {manifest.platform}, {packages}"] = (
-            None
-        )
+    told = dict.fromkeys(  # runs of several machines may differ
+        f"falsifier {m.falsifier}, Python {m.python}, {m.platform}, "
+        + ", ".join(f"{name} {version}" for name, version in m.packages.items())
+        for m in (run.manifest for run in side.runs)
+    )
     return f"{'; '.join(told)}."

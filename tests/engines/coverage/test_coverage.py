@@ -79,10 +79,11 @@ def test_the_order_of_changes_and_the_time_between_them_are_marks() -> None:
 def test_a_change_comes_after_those_of_the_signals_that_changed_last() -> None:
     names = [f"d{k}" for k in range(12)]
     steps = {name: (np.arange(13) > k).astype(float) for k, name in enumerate(names)}
+    steps["d0"][9:] = 0.0  # again, at the time of d8
     outputs: dict[str, Kind] = dict.fromkeys(names, "boolean")
     problem = function_problem(lambda *_: steps, "G (d0 < 2)", (), (), outputs, 12.0, 1.0)
     marks = Marker(problem).marks(Trajectory(np.arange(13.0), steps))
-    assert [m.what[3] for m in marks if m.source == "d11" and m.what[0] == "after"] == names[3:11]
+    assert [m.what[3] for m in marks if m.source == "d11" and m.what[0] == "after"] == ["d0", *names[4:11]]
 
 
 def test_a_signal_that_chatters_does_not_hide_the_others() -> None:
