@@ -87,8 +87,8 @@ def is_locked(path: Path) -> bool:
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except OSError as error:  # else its file system has no locks, so that nobody writes there
-        return isinstance(error, BlockingIOError)
+    except OSError as error:  # else nobody writes there: it is gone, or its file system has no locks
+        return isinstance(error, BlockingIOError | PermissionError)
     return False
 
 
