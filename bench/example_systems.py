@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from falsifier import falsify
 from falsifier.core.function_model import FunctionModel
 from falsifier.core.model import Experiment, Kind, ModelInfo, Variable
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.ranges import InputRange, ParameterRange
+from falsifier.core.space import SearchSpace
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse

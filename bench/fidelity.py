@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from falsifier.core.space import ParameterRange
+from falsifier.core.ranges import ParameterRange
 from falsifier.evaluation.evaluate import evaluate, monitor_for
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem

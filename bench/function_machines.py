@@ -11,7 +11,7 @@ import numpy as np
 
 from bench.example_systems import Array, function_problem
 from falsifier.core.model import Kind
-from falsifier.core.space import InputRange, ParameterRange
+from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.problem.problem import Problem
 from falsifier.testing import Response
 

@@ -12,7 +12,7 @@ from math import cos, exp, pi, sin
 from bench.example_systems import Array, compare
 from bench.function_machines import columns, held, line, requirements, switch, whole
 from bench.function_mixed_machines import CASCADE, CELL, CHARGER, HVAC, INSULIN
-from falsifier.core.space import ParameterRange
+from falsifier.core.ranges import ParameterRange
 
 
 def bounded(value: float, low: float, high: float) -> float:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 from bench.example_systems import Array
 from bench.function_machines import columns, held, line, numbers, requirements, switch, whole
-from falsifier.core.space import ParameterRange
+from falsifier.core.ranges import ParameterRange
 
 
 def insulin(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:

@@ -12,7 +12,7 @@ from math import copysign, exp, log10, sin
 from bench.example_systems import Array, compare
 from bench.function_controllers import CROSSROADS, HEATPUMP, LANEKEEPER, PARKING, VOTER
 from bench.function_machines import columns, held, line, numbers, requirements, switch, whole
-from falsifier.core.space import ParameterRange
+from falsifier.core.ranges import ParameterRange
 
 
 def turbine(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from bench.example_systems import Array, compare
 from bench.function_machines import MACHINES, columns, held, requirements, switch, whole
-from falsifier.core.space import InputRange, ParameterRange
+from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.problem.problem import Problem
 
 

@@ -9,7 +9,7 @@ from math import cos, exp, hypot, sin
 
 from bench.example_systems import Array, compare
 from bench.function_machines import columns, requirements
-from falsifier.core.space import ParameterRange
+from falsifier.core.ranges import ParameterRange
 
 RANGES = {
     "thrown": {

@@ -31,7 +31,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import numpy as np
 
 from falsifier import Candidate, Problem, Signal, falsify, load_problem
-from falsifier.core.space import InputRange
+from falsifier.core.ranges import InputRange
 from falsifier.engines.hybrid import Hybrid
 from falsifier.engines.llm import LLMEngine
 from falsifier.engines.protocol import Engine

@@ -8,7 +8,8 @@ Each is the same good reply (two inputs of three and two control points, one par
 import json
 from collections.abc import Iterator
 
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.ranges import InputRange, ParameterRange
+from falsifier.core.space import SearchSpace
 from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, ChatRequest, Exchange, Message
 from falsifier.llm.replies import ReplyForm

@@ -73,13 +73,13 @@ if TYPE_CHECKING:
         ModelInfo as ModelInfo,
         Variable as Variable,
     )
-    from falsifier.core.signals import Signal as Signal
-    from falsifier.core.space import (
+    from falsifier.core.ranges import (
         Freedom as Freedom,
         InputRange as InputRange,
         ParameterRange as ParameterRange,
-        SearchSpace as SearchSpace,
     )
+    from falsifier.core.signals import Signal as Signal
+    from falsifier.core.space import SearchSpace as SearchSpace
     from falsifier.core.trajectory import Trajectory as Trajectory
     from falsifier.counterexamples.explain import Explanation as Explanation, explain as explain
     from falsifier.counterexamples.robustness_map import (

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from falsifier.core.candidate import Candidate
 from falsifier.core.function_model import FunctionModel
 from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.core.ranges import Freedom, InputRange, ParameterRange
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.engines.protocol import Engine
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem

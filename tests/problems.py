@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from falsifier.core.space import ParameterRange, Scale
+from falsifier.core.ranges import ParameterRange, Scale
 from falsifier.problem.problem import Problem
 from falsifier.testing import Array, lag, lag_problem
 from tests.patience import wait_until

@@ -13,7 +13,8 @@ from math import inf
 import numpy as np
 
 from falsifier.core.arguments import finite, whole
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.ranges import InputRange, ParameterRange
+from falsifier.core.space import SearchSpace
 from falsifier.core.words import counted, in_unit, readable
 from falsifier.engines.box import Proposal
 from falsifier.engines.simple import Uniform

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import Range, number_names
 from falsifier.core.signals import Signal
-from falsifier.core.space import Range, number_names
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.evaluation.levels import Climb

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 from falsifier.analyses.lint import ranges_of, static_findings
-from falsifier.core.space import InputRange, ParameterRange
+from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ChatError, FalsifierError, SpecError
 from falsifier.evaluation.evaluate import Evaluation, compiled, simulate

@@ -13,8 +13,9 @@ from falsifier.cli.output import FAILED, as_shown, conclude
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_text, number_in, one_line
+from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.counterexamples.case import recorded_inputs
 from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import Evaluation, simulate as simulate_inputs

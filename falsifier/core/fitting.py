@@ -7,8 +7,9 @@ from math import floor
 import numpy as np
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import InputRange, Range, is_outside, nearest_value, outside_text
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import InputRange, Range, SearchSpace, is_outside, nearest_value, outside_text
+from falsifier.core.space import SearchSpace
 from falsifier.errors import CandidateError
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from falsifier.core.arguments import one_of, positive
 from falsifier.core.fixed import fixed
 from falsifier.core.literals import digits
+from falsifier.core.ranges import ValueKind
 from falsifier.core.signals import Signal
-from falsifier.core.space import ValueKind
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import OutputError, SpecError, did_you_mean
 

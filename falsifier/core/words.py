@@ -5,8 +5,9 @@ from math import inf
 from typing import Literal
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import InputRange, number_names
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, SearchSpace, number_names
+from falsifier.core.space import SearchSpace
 
 # Maximum number of control points shown; longer signals are abbreviated in the middle.
 _SHOWN_POINTS = 12

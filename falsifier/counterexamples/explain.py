@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from math import inf
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import InputRange, ParameterRange, nearest_value
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, ParameterRange, nearest_value
 from falsifier.core.words import in_unit, named, readable
 from falsifier.counterexamples.shrink import (
     constant_signal,

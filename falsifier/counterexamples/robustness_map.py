@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import Scale
+from falsifier.core.ranges import Scale
 from falsifier.core.words import counted, listed, readable, with_unit
 from falsifier.counterexamples.shrink import sampled_stretches, with_parameter, with_signal, with_stretch
 from falsifier.errors import SpecError, setting

@@ -14,8 +14,8 @@ from math import inf
 
 from falsifier.core.arguments import finite, whole
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import InputRange
 from falsifier.core.signals import Interpolation, Signal
-from falsifier.core.space import InputRange
 from falsifier.counterexamples.simplicity import rest_value, rounder, simplicity
 from falsifier.errors import CandidateError, SpecError, setting
 from falsifier.evaluation.confirm import half_step

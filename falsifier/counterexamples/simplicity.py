@@ -16,8 +16,8 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_EVEN, Decimal
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import digits
+from falsifier.core.ranges import InputRange, ParameterRange, Range
 from falsifier.core.signals import Interpolation
-from falsifier.core.space import InputRange, ParameterRange, Range
 from falsifier.problem.problem import Problem
 
 Key = tuple[object, ...]

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import Freedom, InputRange, nearest_numbers
 from falsifier.core.signals import Interpolation, Signal, even_times
-from falsifier.core.space import Freedom, InputRange, SearchSpace, nearest_numbers
+from falsifier.core.space import SearchSpace
 from falsifier.problem.problem import Problem
 
 # Single precision in the rollout of learnt dynamics, double precision elsewhere.

@@ -10,8 +10,9 @@ from typing import Any
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import shortest
+from falsifier.core.ranges import InputRange, Range, nearest_value
 from falsifier.core.signals import INTERPOLATIONS, Signal
-from falsifier.core.space import InputRange, Range, SearchSpace, nearest_value
+from falsifier.core.space import SearchSpace
 from falsifier.core.words import counted
 from falsifier.errors import CandidateError, SpecError, did_you_mean
 from falsifier.llm.candidate_text import (

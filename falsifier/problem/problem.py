@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Literal
 from falsifier.context.values import Context, Named
 from falsifier.core.arguments import finite, instance, path_of, texts
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
-from falsifier.core.space import SearchSpace, number_names
+from falsifier.core.ranges import number_names
+from falsifier.core.space import SearchSpace
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System
 from falsifier.problem.requirement import Requirement

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from falsifier.core.literals import shortest
 from falsifier.core.model import ModelInfo, Variable
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace, ValueKind
+from falsifier.core.ranges import Freedom, InputRange, ParameterRange, ValueKind
+from falsifier.core.space import SearchSpace
 from falsifier.errors import SpecError, did_you_mean, in_section, naming
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, in_order
 from falsifier.problem.shorthand import named_file, searching, stated_as

@@ -11,8 +11,8 @@ from pydantic_core import PydanticCustomError
 
 from falsifier.core.arguments import utf_8
 from falsifier.core.model import Interface
+from falsifier.core.ranges import Scale
 from falsifier.core.signals import Interpolation
-from falsifier.core.space import Scale
 from falsifier.core.strict import Strict
 from falsifier.errors import did_you_mean, shown, written
 from falsifier.fmu.process.network import Extrapolation, Isolation, Loops, Method

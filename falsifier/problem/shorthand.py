@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from falsifier.core.arguments import instance, texts
 from falsifier.core.literals import number_in, shortest
 from falsifier.core.model import Interface
-from falsifier.core.space import Scale
+from falsifier.core.ranges import Scale
 from falsifier.errors import SpecError, first_fault, in_section, naming, setting, shown, written
 from falsifier.fmu import Rights, resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection

@@ -16,7 +16,7 @@ from pydantic import ConfigDict, Field
 from falsifier import __version__
 from falsifier.context.values import Context
 from falsifier.core.model import Variable
-from falsifier.core.space import Range, ValueKind
+from falsifier.core.ranges import Range, ValueKind
 from falsifier.core.strict import Strict
 from falsifier.core.words import first_few
 from falsifier.errors import FalsifierError, JournalError, did_you_mean, setting

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from falsifier.core.literals import toml_key
-from falsifier.core.space import InputRange, SearchSpace
+from falsifier.core.ranges import InputRange
+from falsifier.core.space import SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import written

@@ -8,7 +8,7 @@ from typing import Any
 from falsifier.analyses.assess import Assurance
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.literals import one_line, shell_word
-from falsifier.core.space import number_names
+from falsifier.core.ranges import number_names
 from falsifier.core.words import candidate_facts, counted, in_unit, readable
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError

@@ -9,8 +9,9 @@ from scipy.stats import binom
 
 from falsifier.analyses.assess import Draws, Searched, assess, lower_bound, upper_bound
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.record.run import falsify

@@ -8,7 +8,7 @@ import pytest
 
 from falsifier import Candidate, Signal, Trajectory, coverage, falsify
 from falsifier.analyses.coverage import Coverage, coverage_of, pace_of
-from falsifier.core.space import ParameterRange, Range
+from falsifier.core.ranges import ParameterRange, Range
 from falsifier.errors import SpecError
 from falsifier.record.manifest import Manifest, ModeRecord, describe
 from falsifier.search.request import RunRequest

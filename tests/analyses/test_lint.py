@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from falsifier.analyses.lint import lint, static_findings, unmoved_findings
 from falsifier.cli.requirements import check
 from falsifier.core.files import bundled
-from falsifier.core.space import ParameterRange, Scale
+from falsifier.core.ranges import ParameterRange, Scale
 from falsifier.errors import SpecError
 from falsifier.problem.source import ProblemSource
 from falsifier.testing import BIAS, Array, lag_problem

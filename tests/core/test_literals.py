@@ -9,8 +9,9 @@ from hypothesis import given, strategies as st
 from falsifier.core import literals
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import printable
+from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.core.words import candidate_facts, in_one_line, signal_text
 from tests.hostile.names import names
 

@@ -10,8 +10,9 @@ from scipy.interpolate import PchipInterpolator
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.fitting import fit
+from falsifier.core.ranges import Freedom, InputRange, ParameterRange
 from falsifier.core.signals import Signal, even_times
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.errors import CandidateError, SpecError
 from falsifier.testing import START, lag_problem
 

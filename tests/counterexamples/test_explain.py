@@ -4,8 +4,8 @@ from dataclasses import replace
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import Freedom, ParameterRange
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.explain import explain
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import Freedom, ParameterRange, ValueKind
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom, ParameterRange, ValueKind
 from falsifier.counterexamples.robustness_map import RobustnessMap, robustness_map
 from falsifier.counterexamples.shrink import sampled_stretches
 from falsifier.errors import SpecError

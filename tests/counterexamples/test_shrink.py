@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import Freedom, ParameterRange
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.shrink import PASSES, Shrunk, shrink
 from falsifier.counterexamples.simplicity import simplicity
 from falsifier.errors import SpecError

@@ -1,8 +1,8 @@
 from dataclasses import replace
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import Freedom, ParameterRange
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom, ParameterRange
 from falsifier.counterexamples.simplicity import rest_value, simplicity
 from falsifier.testing import lag_problem
 

@@ -10,7 +10,7 @@ import pytest
 
 from falsifier.core.function_model import FunctionModel
 from falsifier.core.model import Variable
-from falsifier.core.space import ParameterRange
+from falsifier.core.ranges import ParameterRange
 from falsifier.engines import ENGINES, make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.engines.surrogate import Settings

@@ -3,8 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.signals import Interpolation, Signal
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.engines.layout import Array, Coding, Layout, TimeGrid, fixed_layout, planning_layout
 from falsifier.engines.surrogate.variation import mutations, random_points, stepping, switching

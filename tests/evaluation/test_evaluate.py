@@ -9,8 +9,9 @@ import pytest
 from falsifier.core.candidate import Candidate
 from falsifier.core.function_model import FunctionModel
 from falsifier.core.model import Variable
+from falsifier.core.ranges import InputRange
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.errors import CandidateError, FalsifierError, SimulationError, SpecError
 from falsifier.evaluation.evaluate import evaluate, judge, readable_internals, simulate, start_values
 from falsifier.problem.loading import load_problem

@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.ranges import Freedom, InputRange, ParameterRange
+from falsifier.core.space import SearchSpace
 from falsifier.llm.conversation import RejectedReplyError, converse
 from falsifier.llm.messages import LONGEST_REPLY, ChatReply, ChatRequest, Exchange, Message
 from falsifier.llm.replies import ReplyForm

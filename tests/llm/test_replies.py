@@ -9,8 +9,9 @@ import pytest
 from hypothesis import example, given, settings, strategies as st
 
 from bench.replies import odd_replies, outcome
+from falsifier.core.ranges import Freedom, InputRange, ParameterRange
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom, InputRange, ParameterRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.formalizing import readings_schema
 from falsifier.llm.messages import ChatReply

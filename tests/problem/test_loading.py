@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.core.space import Freedom
+from falsifier.core.ranges import Freedom
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem, load_problems, load_source

@@ -9,7 +9,8 @@ import pytest
 from falsifier.context.values import Context, Named
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment
-from falsifier.core.space import InputRange, ParameterRange, Scale, SearchSpace
+from falsifier.core.ranges import InputRange, ParameterRange, Scale
+from falsifier.core.space import SearchSpace
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.context import named_context, with_context
 from falsifier.problem.loading import load_source

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.core.space import InputRange
+from falsifier.core.ranges import InputRange
 from falsifier.engines import ENGINES, make_engine
 from falsifier.engines.box import BoxEngine
 from falsifier.problem.loading import load_problem

@@ -8,8 +8,9 @@ import pytest
 
 from falsifier.analyses.assess import assess
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import InputRange, ParameterRange, ValueKind
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace, ValueKind
+from falsifier.core.space import SearchSpace
 from falsifier.engines import make_engine
 from falsifier.errors import ChatError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm

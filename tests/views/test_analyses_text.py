@@ -5,7 +5,7 @@ import numpy as np
 from falsifier import Candidate, Signal
 from falsifier.analyses.coverage import coverage_of
 from falsifier.analyses.formalize import formalize
-from falsifier.core.space import Range
+from falsifier.core.ranges import Range
 from falsifier.core.trajectory import Trajectory
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.views.analyses_text import coverage_json, coverage_text, formalized_text, trace_lines

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.space import InputRange, ParameterRange
+from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.engines.layout import Array, Layout
 
 # Discrete inputs with more values than this are drawn like real ones.

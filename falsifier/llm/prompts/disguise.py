@@ -12,7 +12,8 @@ from typing import TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Kind, ModelInfo, Variable
-from falsifier.core.space import InputRange, ParameterRange, SearchSpace, ValueKind
+from falsifier.core.ranges import InputRange, ParameterRange, ValueKind
+from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts.view import View

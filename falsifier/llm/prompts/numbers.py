@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import InputRange, Range
 from falsifier.core.signals import Signal, even_times
-from falsifier.core.space import Dimension, InputRange, Range
+from falsifier.core.space import Dimension
 from falsifier.llm.prompts.view import View
 from falsifier.stl.margins import is_on_limit
 

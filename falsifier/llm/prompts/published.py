@@ -7,8 +7,9 @@ from collections.abc import Iterator
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import shortest
+from falsifier.core.ranges import InputRange, Range
 from falsifier.core.signals import Signal
-from falsifier.core.space import Dimension, InputRange, Range
+from falsifier.core.space import Dimension
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted
 from falsifier.evaluation.evaluate import Evaluation

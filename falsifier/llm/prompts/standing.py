@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from falsifier.context.values import Context
-from falsifier.core.space import Freedom, InputRange, ParameterRange
+from falsifier.core.ranges import Freedom, InputRange, ParameterRange
 from falsifier.core.words import counted, listed, with_unit
 from falsifier.llm.prompts.numbers import bounds, number
 from falsifier.llm.prompts.view import Variant, View

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.analyses.coverage import Coverage, OutputCoverage, PairCoverage, RangeCoverage, edges_of
-from falsifier.core.space import number_names
+from falsifier.core.ranges import number_names
 from falsifier.core.words import counted, with_unit
 from falsifier.counterexamples.robustness_map import RobustnessMap
 from falsifier.views.plotting.axes import Colour, caption, fit_labels, new_figure, whole_ticks

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import Range, number_names
+from falsifier.core.ranges import Range, number_names
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import with_unit
 from falsifier.stl import Formula

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from falsifier.core.arguments import instance
-from falsifier.core.space import number_names
+from falsifier.core.ranges import number_names
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import readable, shortened, with_unit
 from falsifier.evaluation.confirm import Confirmation

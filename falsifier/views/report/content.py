@@ -9,7 +9,7 @@ from falsifier.campaigns.analysis import Run, Table, load, main_table, not_begun
 from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.candidate import Candidate
-from falsifier.core.space import number_names
+from falsifier.core.ranges import number_names
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import in_one_line
 from falsifier.counterexamples.store import EXPLANATION, SHRUNK, beside, load_counterexample

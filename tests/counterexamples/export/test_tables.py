@@ -8,8 +8,8 @@ from scipy.io import loadmat
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Kind, ModelInfo, Variable
+from falsifier.core.ranges import Freedom
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom
 from falsifier.counterexamples.export.tables import (
     InputTable,
     input_table,

@@ -6,7 +6,7 @@ import numpy as np
 
 from bench.example_systems import Array, function_problem
 from falsifier.core.model import Kind
-from falsifier.core.space import Freedom, InputRange
+from falsifier.core.ranges import Freedom, InputRange
 from falsifier.problem.problem import Problem
 
 INTERVAL = 0.1

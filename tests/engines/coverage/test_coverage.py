@@ -6,7 +6,7 @@ from hypothesis import example, given, strategies as st
 
 from bench.example_systems import function_problem
 from falsifier.core.model import Kind
-from falsifier.core.space import Freedom, InputRange, ParameterRange
+from falsifier.core.ranges import Freedom, InputRange, ParameterRange
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines.coverage import CoverageEngine
 from falsifier.engines.coverage.explorer import describe

@@ -8,7 +8,7 @@ import pytest
 from bench.example_systems import Array, function_problem
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Kind
-from falsifier.core.space import ParameterRange
+from falsifier.core.ranges import ParameterRange
 from falsifier.engines.optimisers.bayesian import Bayesian
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.problem.problem import Problem

@@ -10,7 +10,7 @@ import pytest
 from bench.example_systems import function_problem
 from falsifier.context.values import Context, Crossing
 from falsifier.core.model import Kind
-from falsifier.core.space import Freedom, InputRange, ParameterRange
+from falsifier.core.ranges import Freedom, InputRange, ParameterRange
 from falsifier.engines import make_engine
 from falsifier.engines.surrogate import Surrogate
 from falsifier.evaluation.evaluate import evaluate

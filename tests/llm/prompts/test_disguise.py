@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import InputRange
 from falsifier.core.signals import Signal
-from falsifier.core.space import InputRange, SearchSpace
+from falsifier.core.space import SearchSpace
 from falsifier.engines.briefing import preview
 from falsifier.engines.llm import LLMEngine
 from falsifier.evaluation.evaluate import Evaluation, evaluate

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from falsifier.core.space import ParameterRange
+from falsifier.core.ranges import ParameterRange
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.requirement import Requirement
 from falsifier.stl import parse

@@ -11,7 +11,8 @@ import pytest
 from falsifier.context.values import Compared, Context, Excerpt
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Variable
-from falsifier.core.space import ParameterRange, SearchSpace
+from falsifier.core.ranges import ParameterRange
+from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate

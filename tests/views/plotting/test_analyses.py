@@ -6,8 +6,8 @@ import pytest
 from falsifier import Trajectory
 from falsifier.analyses.coverage import coverage_of
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import Freedom, Range
 from falsifier.core.signals import Signal
-from falsifier.core.space import Freedom, Range
 from falsifier.counterexamples.robustness_map import robustness_map
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.testing import START, lag_problem
