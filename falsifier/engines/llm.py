@@ -12,6 +12,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines.briefing import Briefing
+from falsifier.engines.layout import fixed_layout
 from falsifier.engines.protocol import RANDOM_CHANGE
 from falsifier.errors import ChatError
 from falsifier.evaluation.confirm import Confirmation
@@ -188,17 +189,13 @@ def reason_in_remark(reason: str) -> str:
 
 def random_change(space: SearchSpace, best: Candidate | None, *, seed: tuple[int, ...]) -> Candidate:
     """Return a random change of a candidate in at least one number; without one, any point of the space."""
-    rng = np.random.default_rng(seed)
-    logs = np.array([d.scale == "log" for d in space.dimensions])
-    old = space.bounds[:, 0] if best is None else space.encode(best)
-    low, high, old = (np.log(v, where=logs, out=v.copy()) for v in (*space.bounds.T, old))
+    rng, box = np.random.default_rng(seed), fixed_layout(space)
     if best is None:
-        new = low + rng.random(len(low)) * (high - low)
-        return space.decode(np.exp(new, where=logs, out=new))
-    changed = rng.random(len(low)) < _SHARE
-    changed[rng.integers(len(low))] = True
-    noise = np.where(changed, rng.normal(0.0, _DEVIATION, len(low)) * (high - low), 0.0)
-    is_inside = (low <= old + noise) & (old + noise <= high)
+        return box.candidate(rng.random(box.dimension), origin="", rationale="")
+    changed = rng.random(box.dimension) < _SHARE
+    changed[rng.integers(box.dimension)] = True
+    noise = np.where(changed, rng.normal(0.0, _DEVIATION, box.dimension), 0.0)
+    old = box.point(best)
+    is_inside = (old + noise >= 0.0) & (old + noise <= 1.0)
     # A step across a limit is taken the other way, or a number at its limit would often not change at all.
-    new = np.clip(np.where(is_inside, old + noise, old - noise), low, high)
-    return space.decode(np.exp(new, where=logs, out=new))
+    return box.candidate(np.where(is_inside, old + noise, old - noise), origin="", rationale="")

@@ -226,8 +226,7 @@ class Problem:
             self.experiment,
             sorted(self.parameters.items()),
         )
-        # Without what is usual: runs that were recorded before there was a choice can be continued.
-        return sha256(repr(content).replace(", scale='linear'", "").encode()).hexdigest()
+        return sha256(repr(content).encode()).hexdigest()
 
 
 def _held(v: Variable, info: ModelInfo, given: Mapping[str, float | str]) -> Held:

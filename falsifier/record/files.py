@@ -71,6 +71,7 @@ def locked(path: Path, *, busy: str, patience: float = 0.0) -> Iterator[None]:
         JournalError: if another process still holds it after that time.
         MachineError: if the file system has no locks.
     """
+    # The package filelock would fall back to files without locks, which a second process removes.
     until = monotonic() + patience
     while (held := lock_file(path, 0o666)) is None:
         if monotonic() > until:
