@@ -161,7 +161,7 @@ def read_rows(path: Path) -> list[Row]:
     if missing := [name for name in _READ if name not in columns]:
         raise SpecError(
             f"expected a CSV file in the ARCH-COMP validation format, as falsifier report DIR "
-            f"--arch-comp FILE writes it; columns that are missing: {', '.join(missing)}",
+            f"--arch-comp FILE writes it; missing columns: {', '.join(missing)}",
             file=str(path),
         )
     found = (dict(zip(columns, cells, strict=False)) for _, cells in rows)

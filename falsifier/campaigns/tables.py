@@ -253,10 +253,10 @@ _NUMBERS: Mapping[str, Callable[[Statistics], str]] = {
     "cost $": lambda s: "unknown" if s.runs and s.cost is None else _number(s.cost if s.runs else None, 4),
 }
 _LEGEND = (
-    "FR: falsified runs / finished runs, which falsified, spent their budget or tried all. Budget: limit on "
-    "the simulations of a run; several if runs differ. S: simulations per falsified run; std is the sample "
-    "standard deviation. Intervals, from five runs on: Wilson for FR, percentile bootstrap for the mean. "
-    "Best robustness: the smallest of all runs. Seconds, tokens and cost are means per run."
+    "FR: falsified runs / finished runs (those that falsified, spent their budget or tried all candidates). "
+    "Budget: limit on the simulations of a run; several if runs differ. S: simulations per falsified run; "
+    "std is the sample standard deviation. Intervals, from five runs on: Wilson for FR, percentile bootstrap "
+    "for the mean. Best robustness: the smallest of all runs. Seconds, tokens and cost are means per run."
 )
 _PUBLISHED_LEGEND = (
     "Rank: position among all published tools known for the requirement, by FR, then by mean S, whatever the "
@@ -273,7 +273,7 @@ _COUNTED: Mapping[str, Callable[[Statistics], str]] = {
     "Simulations that failed": lambda s: f"{s.failures} of {s.simulations}" if s.failures else "",
     "Replies from the cache, whose tokens and cost are not counted": lambda s: str(s.kept or ""),
     "Runs that began with known inputs": lambda s: f"{s.known} of {s.runs}" if s.known else "",
-    "Runs with the seed of another one, so intervals are too narrow": lambda s: str(s.repeated or ""),
+    "Runs that repeat the seed of another, so intervals are too narrow": lambda s: str(s.repeated or ""),
     "Different ranges, options or context files, counted together": lambda s: (
         str(s.settings) if s.settings > 1 else ""
     ),

@@ -103,7 +103,9 @@ def test_rows_without_a_counterexample_need_no_input(tmp_path: Path) -> None:
 
 def test_another_table_is_told_from_a_validation_file(tmp_path: Path) -> None:
     (tmp_path / "all.csv").write_text("requirement,method,robustness\nHARD,corners,1.0\n")
-    with pytest.raises(SpecError, match=r"all\.csv: expected .* ARCH-COMP .* missing: property, input"):
+    with pytest.raises(
+        SpecError, match=r"all\.csv: expected .* ARCH-COMP .* missing columns: property, input"
+    ):
         read_rows(tmp_path / "all.csv")
 
 

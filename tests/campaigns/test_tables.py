@@ -78,7 +78,7 @@ def test_the_table_tells_what_cannot_be_compared(runs: list[Run]) -> None:
     table = main_table([runs[0], replace(runs[0], request=own), replace(runs[1], request=known)], PUBLISHED)
     assert cells(table.rows, table.header, "budget") == ["20, 60"]
     assert "Runs that began with known inputs: HARD uniform 1 of 3." in table.notes
-    assert "Runs with the seed of another one, so intervals are too narrow: HARD uniform 1." in table.notes
+    assert "Runs that repeat the seed of another, so intervals are too narrow: HARD uniform 1." in table.notes
     assert not any("counted together" in note for note in table.notes), (
         "neither a place nor a seed is a setting"
     )
