@@ -7,6 +7,7 @@ from pathlib import Path
 from shlex import quote
 
 from falsifier.core.literals import printable
+from falsifier.core.words import listed
 from falsifier.errors import SpecError, did_you_mean, written
 
 # Letters and bits of worker/platform/sandbox.h.
@@ -197,7 +198,8 @@ def described(rights: Rights, enforced: int) -> str:
     may_not += [] if rights.programs else [(executing, _FILES | _SYSTEM_CALLS)]
     may_not += [] if rights.network else [(connecting, _SYSTEM_CALLS)]
     may_not += [("reach other processes", _PROCESSES), ("change their settings", _SYSTEM_CALLS)]
-    text = f"the FMU may {', '.join(may)}; it may not {', '.join(what for what, _ in may_not)}"
+    *barred, last = (what for what, _ in may_not)
+    text = f"the FMU may {listed(may)}; it may not {', '.join(barred)} or {last}"
     lacking = [what for what, bits in may_not if not enforced & bits]
     if not lacking:
         return text
