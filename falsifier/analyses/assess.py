@@ -118,8 +118,8 @@ class Assurance:
         if self.searched is not None:
             lines.append(self._searched_text(self.searched))
         lines.append(
-            "Probability of what: of inputs drawn uniformly from the search space with this "
-            f"parameterization, not of inputs in operation: {self.distribution}."
+            "This probability is for inputs drawn uniformly from the search space with this "
+            f"parameterization, not for inputs in operation: {self.distribution}."
         )
         if self.interrupted:
             lines.append("Stopped by the user: more simulations would say more.")
@@ -137,7 +137,7 @@ class Assurance:
         found = f"The search found a violation in {counted(searched.violation, 'simulation')}"
         if not searched.drawable:
             return f"{found}, with control points that are not drawn here: the bound says nothing about it."
-        return f"{found}." if self.violations else f"{found}, although no draw is one."
+        return f"{found}." if self.violations else f"{found}, although no draw violates."
 
 
 def assess(

@@ -99,7 +99,7 @@ def static_findings(problem: Problem) -> Iterator[LintFinding]:
         yield LintFinding(name, "units", str(predicate), text, "convert one side in the formula")
     for part in formula.walk():
         if isinstance(part, Bare):
-            text = f"{part.left} stands alone like a Boolean, but is a number, so that it means {part}"
+            text = f"{part.left} stands alone like a Boolean, but is a number, so it means {part}"
             yield LintFinding(name, "boolean", str(part.left), text, "write the comparison that is meant")
         if isinstance(part, And | Or):
             yield from _implied_side(name, part)
@@ -132,7 +132,7 @@ def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
     because = f"as long as {listed(bounds)}" if bounds else "whatever happens"
     if part == problem.requirement.formula:
         what = "no trajectory in range violates it" if holds else "every trajectory in range violates it"
-        advice = "check threshold, direction of the inequality and ranges; a search is of no use"
+        advice = "check threshold, direction of the inequality and ranges; a search would be of no use"
     else:
         what = "this part always holds" if holds else "this part never holds"
         advice = "check its threshold and direction, or leave it out"
@@ -147,7 +147,7 @@ def _windows(problem: Problem) -> Iterator[LintFinding]:
         if part.window == Window(0.0, 0.0) and not isinstance(part, Until):
             text, advice = "the window contains only the present", f"leave it out: {part.children[0]}"
         elif part.signals and set(part.signals) <= still:
-            text = f"nothing changes {listed(part.signals)} over time, so that the window does not matter"
+            text = f"nothing changes {listed(part.signals)} over time, so the window does not matter"
             advice = "leave the window out, or name a signal that changes"
         else:
             continue

@@ -155,7 +155,7 @@ def bench(
 def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
     """Follow the run or campaign in DIRECTORY from another terminal until it ends or is stopped.
 
-    This writes nothing to DIRECTORY unless somebody presses the button of --allow-stop. The page of --page
+    This writes nothing to DIRECTORY unless somebody presses the button that --allow-stop adds. The page
     can also be opened after the run has ended.
     """
     if page:

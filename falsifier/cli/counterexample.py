@@ -55,8 +55,8 @@ Told = tuple[list[str], dict[str, Any]]
     "--at-most",
     type=float,
     metavar="ROBUSTNESS",
-    help="With --shrink: maximum robustness of the simpler one; 0: any violation. Default: half of that of "
-    "a counterexample, or a tenth more than that of a nearest miss.",
+    help="With --shrink: maximum robustness of the simpler one; 0: any violation. Default: half that of "
+    "the counterexample, or a tenth more than that of the nearest miss.",
 )
 @options.requirement_option
 @options.out_option(

@@ -77,9 +77,9 @@ def connection_options(command: Function) -> Function:
             "llm_options",
             multiple=True,
             metavar="NAME=VALUE",
-            help="How to ask it: timeout=SECONDS (default: 600), price=SENT:RECEIVED in US dollars per "
-            "million tokens, cache=no; all other names go to the provider unchanged, e.g. max_tokens=4000. "
-            "Repeatable.",
+            help="Option of requests to the language model: timeout=SECONDS (default: 600), "
+            "price=SENT:RECEIVED in US dollars per million tokens, cache=no; any other NAME goes to the "
+            "provider unchanged, e.g. max_tokens=4000. Repeatable.",
         ),
     )
 

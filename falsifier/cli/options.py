@@ -54,8 +54,8 @@ def parameterization_option(*, multiple: bool = False, default: str = DEFAULT_PA
     return option(
         "--parameterization",
         "parameterization",
-        "free: engines may choose control points within the spec's limits; with SECONDS, those of every "
-        "input, in pieces at least this long; fixed: the spec's own. PROFILE: a profile of the spec.",
+        "free: engines may choose control points within the spec's limits; free:SECONDS: those of every "
+        "input, at least this far apart; fixed: those of the spec. PROFILE: a profile of the spec.",
         multiple=multiple,
         metavar="[PROFILE,]free[:SECONDS]|fixed",
         type=parameterized,
@@ -165,7 +165,7 @@ def problem_options(command: Function, *, searches: bool = True) -> Function:
         *([search] if searches else []),
         parameterization_option(),
         interface_option(
-            "FMI interface; default: the spec's, which is needed if the FMU offers both; without a spec "
+            "FMI interface; default: the spec's, which is needed if the FMU offers both; without a spec, "
             "co-simulation if the FMU offers it."
         ),
         click.option("--stop-time", type=number, metavar="SECONDS", help="End of each simulation."),

@@ -91,7 +91,7 @@ def formalize(*, target: str, sentence: str, choose: int | None, out: Path | Non
 
     MODEL is an FMU, a spec or a bundled name. A language model answers with one to three readings; each is
     checked, restated in words, distinguished from the others by an example and judged on one simulation.
-    Without one, templates serve: --stl 'NAME argument=value ...' of run and other commands.
+    Without a language model, use a template: --stl 'NAME argument=value ...' of run and other commands.
     """
     from falsifier.problem.writing import subject_of
     from falsifier.views.analyses_text import formalized_text

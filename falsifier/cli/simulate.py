@@ -68,7 +68,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         if inputs and not known:
             warn(
                 f"{problem.name}: no inputs given: all keep the problem's fixed values or the model's start "
-                "values; --inputs u.csv or --set NAME=VALUE gives some"
+                "values; --inputs u.csv or --set NAME=VALUE sets them"
             )
         if out is not None:
             made_folder(out)

@@ -159,8 +159,8 @@ def _fitting(contents: _Contents, room: int) -> list[tuple[int, str]]:
         shrinkable = [k for k, i in enumerate(chosen) if i + 1 < len(forms[k])]
         if not shrinkable:
             raise SpecError(
-                f"context: {counted(len(contents), 'file')} are too many even with only their names told; "
-                "name fewer"
+                f"context: {counted(len(contents), 'file')} are too many even to give only their "
+                "names; name fewer"
             )
         chosen[max(shrinkable, key=size)] += 1
     return [(i, each[i][1]) for i, each in zip(chosen, forms, strict=True)]

@@ -48,7 +48,7 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
         if value is None:
             raise _missing(p)
         if p.name not in candidate.parameters:
-            notes.append(f"{p.name} is not given: {value:g}, its value if it is not searched")
+            notes.append(f"{p.name} is not given: its nominal value, {value:g}, is used")
         notes += _rounded(p, (value,))
         parameters[p.name] = value
     return Fitted(

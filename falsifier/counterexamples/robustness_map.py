@@ -137,8 +137,8 @@ class RobustnessMap:
         if known.size and (known == self.original).all():
             return f"None of these changes moved the robustness.{end}"
         most = [f"{self.coordinates[i].label} ({self.influences[i]:+.2f})" for i in self.axes]
-        named = f"{listed(most)} most" if any(self.influences) else "none of these values"
-        return f"Over these changes the robustness follows {named} (rank correlation).{end}"
+        named = f"most with {listed(most)}" if any(self.influences) else "with none of these values"
+        return f"Over these changes the robustness correlates {named} (rank correlation).{end}"
 
 
 def robustness_map(

@@ -146,7 +146,7 @@ def check_options(llm: str, options: Mapping[str, Any], *, api_base: str | None 
         ChatSetupError: naming the option.
     """
     if "timeout" in options:
-        raise ChatSetupError("timeout: state it beside the options, which also limits slow replies")
+        raise ChatSetupError("timeout: pass it as an argument; in options it would not limit slow replies")
     provider = known(llm)
     is_own = stated_address(llm, api_base) is not None or provider.local or not provider.keys
     if not options or is_own or provider.routes:

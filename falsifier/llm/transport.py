@@ -50,7 +50,7 @@ _MOST_MALFORMED = 3
 _WITHIN = "the connection was cut within the reply"
 _CUT = "the server or a proxy before it ended it; its log says why"
 _ADDRESS = "check host, port and http or https in the server's address"
-_NO_LLM = f"that is no server of a language model; {_ADDRESS}"
+_NO_LLM = f"that is not a language model's server; {_ADDRESS}"
 # How httpx and what it stands on tell a failure, by words of it, and what causes and cures it.
 _FAULTS = (
     (

@@ -214,7 +214,7 @@ class ComponentSection(Section):
 
     fmu: str = Field(description="Path of the FMU, relative to the spec file.")
     step: Seconds | None = Field(
-        None, description="Step of its own in s, an integer multiple of the communication step."
+        None, description="Its own step in s, an integer multiple of the communication step."
     )
     interface: Interface | None = Field(
         None, description="co-simulation or model-exchange; default: co-simulation if the FMU offers it."
@@ -312,5 +312,5 @@ class ProfileSection(ModelChanges):
 
     description: str = Field("", description="What it is for.")
     requirements: dict[str, ModelChanges] = Field(
-        default_factory=dict, description="What it changes for single requirements, by their names."
+        default_factory=dict, description="What it changes for individual requirements, by name."
     )

@@ -75,7 +75,7 @@ class Overshoot(Template):
     signal: Term = _SIGNAL
     reference: Term = _REFERENCE
     at_most: Margin = Field(description="Number in the signal's unit, or a percentage of the reference.")
-    direction: Literal["up", "down"] = Field("up", description="down: falls below the reference by at most.")
+    direction: Literal["up", "down"] = Field("up", description="down: at_most limits how far it falls below.")
     after: Moment = _AFTER
     duration: Duration | None = Field(
         None, description="How long it applies in s; default after a time: to the end of the simulation."
@@ -95,9 +95,9 @@ class Rise(Template):
     signal: Term = _SIGNAL
     reference: Term = _REFERENCE
     reaches: Margin = Field(
-        "90%", description="Share of the reference that is reached, as a percentage; state it if down."
+        "90%", description="Share of the reference to reach, as a percentage; required if down."
     )
-    time: Duration = Field(description="Time in s until then, at most.")
+    time: Duration = Field(description="Maximum time in s until it is reached.")
     direction: Literal["up", "down"] = Field("up", description="down: it falls to that share.")
     after: Moment = _AFTER
 
@@ -151,8 +151,8 @@ class StaysWithin(Template):
     signal: Term = _SIGNAL
     low: Term | None = Field(None, description="Lower limit: a number, a signal or an expression.")
     high: Term | None = Field(None, description="Upper limit.")
-    reference: Term | None = Field(None, description="In place of limits: what it stays near.")
-    within: Margin | None = Field(None, description="With reference: a number, or a percentage of it.")
+    reference: Term | None = Field(None, description="In place of low and high: what it stays near.")
+    within: Margin | None = Field(None, description="How near: a number, or a percentage of the reference.")
 
     @model_validator(mode="after")
     def _limits_or_reference(self) -> "StaysWithin":
@@ -188,8 +188,8 @@ class Dwell(Template):
 
     template: Literal["dwell"]
     condition: Condition = Field(description="Condition.")
-    at_least: Duration | None = Field(None, description="How long it holds in s, at least.")
-    at_most: Duration | None = Field(None, description="How long it holds in s, at most.")
+    at_least: Duration | None = Field(None, description="Minimum time in s for which it holds.")
+    at_most: Duration | None = Field(None, description="Maximum time in s for which it holds.")
 
     @model_validator(mode="after")
     def _limited(self) -> "Dwell":

@@ -27,10 +27,10 @@ def coverage_text(found: Coverage, name: str) -> str:
     if found.ranges:
         header = ("searched", "range", "tried", "parts tried", "changes")
         lines += _indented([header, *map(_range_row, found.ranges)])
-        lines.append("  A part is a tenth of the range, or one of a few whole numbers.")
+        lines.append("  A part is a tenth of the range, or one number if there are only a few whole ones.")
         if any(r.paces for r in found.ranges):
             lines.append(
-                "  Changes of an input in a simulation, by its fastest; slow: the range takes "
+                "  Changes: the fastest of the input in each simulation; slow: the whole range takes "
                 f"{SLOW * found.stop_time:.4g} s or more; fast: {FAST * found.stop_time:.4g} s or less."
             )
     gaps = [*_gap_rows(found), *_pair_rows(found.pairs)]

@@ -116,7 +116,7 @@ def test_what_a_search_found_is_stated_beside_the_bound_and_no_violation_is_of_p
     found = assess(system(0.9999), budget=100, searched=searched)
     assert found.violations == 0
     assert found.searched == Searched(1, searched[-1].robustness, 1)
-    assert "The search found a violation in 1 simulation, although no draw is one." in found.text
+    assert "The search found a violation in 1 simulation, although no draw violates." in found.text
     doubts = [doubtful(found.problem, searched[-1])]
     found = assess(found.problem, budget=5, searched=searched, doubtful=doubts)
     assert found.searched == Searched(1, searched[-1].robustness, unconfirmed=1)
@@ -137,7 +137,8 @@ def test_what_a_probability_is_of_is_said() -> None:
     problem = lag_problem(points=5, parameters=[START], free=FREE)
     text = assess(problem, budget=3).text
     for part in (
-        "inputs drawn uniformly from the search space with this parameterization, not of inputs in operation",
+        "inputs drawn uniformly from the search space with this parameterization",
+        "not for inputs in operation",
         "u with 5 control points 2.5 s apart, linear, each uniform in [-1, 1] V",
         "x0 uniform in [-1, 1]",
         "other control points, which a search may try, are not drawn",

@@ -48,7 +48,7 @@ def test_bundled_specs_raise_no_false_alarm(name: str) -> None:
 FOUND = [
     ("G[0,20] (throttle <= 100)", "always", "G[0,20] (throttle <= 100)", "throttle in [0, 100]"),
     ("F[0,20] (throttle > 100.5)", "never", "F[0,20] (throttle > 100.5)", "every trajectory"),
-    ("G (throttle > 120 -> speed <= 50)", "always", "G (throttle > 120 -> speed <= 50)", "search is"),
+    ("G (throttle > 120 -> speed <= 50)", "always", "G (throttle > 120 -> speed <= 50)", "search would be"),
     ("G[0,20] (throttle < 50 or brake > 1 or speed < 9)", "never", "brake > 1", "brake = 0"),
     ("G[0,20] (throttle < 50 or waitTicks > 3 or speed < 9)", "never", "waitTicks > 3", "waitTicks = 2"),
     ("G[0,0] (speed <= 120)", "window", "G[0,0] (speed <= 120)", "leave it out: speed <= 120"),
@@ -56,7 +56,7 @@ FOUND = [
     ("G[0,20] (rpm <= 12) and G[0,10] (rpm <= 12)", "window", "G[0,10] (rpm <= 12)", "does not matter"),
     ("G[0,20] (speed <= 120 and speed <= 130)", "implied", "speed <= 130", "which implies it"),
     ("F[0,9] (speed >= 90) or F[0,5] (speed >= 90)", "window", "F[0,5] (speed >= 90)", "which it implies"),
-    ("G[0,20] speed", "boolean", "speed", "so that it means speed >= 0.5"),
+    ("G[0,20] speed", "boolean", "speed", "so it means speed >= 0.5"),
     ("G[0,20] (speed - rpm <= 5)", "units", "speed - rpm <= 5", "speed is in mph, rpm in "),
     *((formula, "", "", "") for formula in ("G[0,20] (gear == 3)", "G[0,20] (gear != 3)", "F (gear == 3)")),
     ("G[0,60] (speed <= 5)", "invalid", "", "simulate longer"),

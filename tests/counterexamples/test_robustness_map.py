@@ -43,7 +43,7 @@ def test_the_violation_persists_as_far_as_it_does() -> None:
     # At 10 s u has full effect, x0 almost none.
     u, x0 = found.influences
     assert u < -0.99 and abs(x0) < 0.3
-    assert f"the robustness follows u [V] ({u:+.2f}) and x0 ({x0:+.2f}) most (rank correlation)" in found.text
+    assert f"robustness correlates most with u [V] ({u:+.2f}) and x0 ({x0:+.2f}) (rank correl" in found.text
     many = replace(found, robustness=np.r_[np.nan, -np.ones(999)], sizes=np.full(1000, 0.1)).text
     assert "99 % of those up to 10 %" in many and "1 simulation failed and counted as no violation." in many
 
@@ -85,7 +85,7 @@ def test_what_moves_nothing_has_no_influence() -> None:
     found = robustness_map(flat, evaluate(flat, flat.space.decode([1.0] * 4 + [0.0])), budget=8)
     assert set(found.influences) == {0.0}
     assert "None of these changes moved the robustness." in found.text
-    assert "follows none of these values" in replace(found, robustness=found.robustness + 1.0).text
+    assert "correlates with none of these values" in replace(found, robustness=found.robustness + 1.0).text
 
 
 def test_changes_stay_within_the_ranges_and_are_repeatable() -> None:

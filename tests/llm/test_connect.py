@@ -93,7 +93,7 @@ def test_an_option_that_the_provider_does_not_have_is_refused(
 def test_options_of_servers_that_are_not_known_are_sent_as_they_are() -> None:
     connect("openai/m", api_base="http://127.0.0.1:9", options={"foo": 1})
     connect("ollama_chat/x", options={"foo": 1})
-    with pytest.raises(ChatSetupError, match="timeout: state it beside the options"):
+    with pytest.raises(ChatSetupError, match="timeout: pass it as an argument"):
         connect("ollama_chat/x", options={"timeout": 5})
 
 
