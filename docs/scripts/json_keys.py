@@ -55,7 +55,7 @@ _KEYS: Mapping[str, Mapping[str, tuple[str, str]]] = {
         "failures": ("list", "causes of failed simulations, with how often each occurred"),
         "not_searched": (
             "list",
-            "what keeps a value: `name`, `causality`, `value`, the name of its `item`, `reason`",
+            "what was not varied: `name`, `causality`, `value`, the name of its `item`, `reason`",
         ),
         "fragile": ("list", "violations that are gone at half the step: evaluations with the `reason`"),
         "remarks": ("list", "what to know of how the engine worked, in words"),
@@ -67,8 +67,8 @@ _KEYS: Mapping[str, Mapping[str, tuple[str, str]]] = {
         **_CANDIDATE,
         "robustness": (
             "number",
-            "in the unit of what decided it; below 0 is a violation; null: it could not be judged, as are "
-            "the next four",
+            "in the unit of what decided it; below 0 is a violation; null, like the next four, if it could "
+            "not be judged",
         ),
         "critical_time": ("number", "time in s that decided the robustness"),
         "predicate": ("string", "part of the formula that decided it"),
