@@ -127,6 +127,9 @@ def _unknown(name: str, info: ModelInfo) -> str:
     if items := [f"{word} is {v.literals[word]} of {v.name}" for v in info.variables if word in v.literals]:
         told = ", ".join(items[:3])
         return f"unknown signal {name!r}; formulas name items of enumerations by their numbers: {told}"
+    # What a reader left out of a model says what to write instead.
+    if told := next((note for note in info.notes if note.startswith(f"the output {name} of ")), ""):
+        return f"unknown signal {name!r}; {told}"
     usual = [v.name for v in (*info.observables, *info.inputs) if v.kind != "string"]
     listing = did_you_mean(name, usual)
     near = did_you_mean(name, (v.name for v in info.variables))

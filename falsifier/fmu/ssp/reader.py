@@ -31,6 +31,7 @@ from falsifier.fmu.ssp.package import (
 )
 from falsifier.fmu.systems.components import Component, Connection, Frame
 from falsifier.fmu.systems.system import System
+from falsifier.stl.lexer import name_text
 
 _FMU_TYPE = "application/x-fmu-sharedlibrary"
 _INTERFACES: Mapping[str, Interface | None] = {"any": None, **{t: i for i, t in INTERFACE_TAGS.items()}}
@@ -152,15 +153,15 @@ class _Reader:
                 if (factor, offset) == _UNCHANGED and source[0] in self.components:
                     outputs.append((end[1], _title(source)))
                     continue
-                value = f"{_title(source)} * {factor:.6g} {offset:+.6g}"
+                value = f"{name_text(_title(source))}{_conversion_text(factor, offset)}"
                 why = "nothing feeds it" if source == end else f"write {value} in formulas"
                 self.notes.append(f"the output {end[1]} of the package is left out: {why}")
             elif kind == "input" and end[0] in self.components and end in self._steps:
                 source, (factor, offset) = self._traced(end)
                 connections[_title(end)] = Connection(_title(source), factor, offset)
                 if (factor, offset) != _UNCHANGED:
-                    shown = f"* {factor:.6g} {offset:+.6g}"
-                    self.notes.append(f"{_title(source)} -> {_title(end)}: {shown}, as the package says")
+                    shown = f"{_title(source)} -> {_title(end)}:{_conversion_text(factor, offset)}"
+                    self.notes.append(f"{shown}, by units and transformations of the package")
                 if source[0] not in self.components:
                     fed = self._passing(source, end, factor, offset)
                     inputs[source] = self._joint(inputs.get(source, fed), fed)
@@ -423,6 +424,12 @@ def _kind(type_name: str) -> str:
 
 def _named(at: str) -> str:
     return f"the element {at}" if at else "the system"
+
+
+def _conversion_text(factor: float, offset: float) -> str:
+    """Return what follows a name, as formulas have it: with digits enough to compute with."""
+    added = f" {'-' if offset < 0 else '+'} {abs(offset):.15g}" if offset else ""
+    return (f" * {factor:.15g}" if factor != 1.0 else "") + added
 
 
 def _title(end: End) -> str:
