@@ -230,7 +230,7 @@ def subject_of(target: str) -> Subject:
         SpecError: if the target is none of these.
         ModelError: if the FMU cannot be read.
     """
-    if target.endswith(MODEL_FILES):
+    if target.lower().endswith(MODEL_FILES):
         fmu = Path(target)
         if not fmu.is_file():
             raise SpecError(f"{absent(fmu)}; give the path of an FMU or SSP package, or a spec")

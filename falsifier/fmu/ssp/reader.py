@@ -90,7 +90,7 @@ def read_package(path: str | Path, *, coupling: Coupling | None = None) -> Syste
 
 def is_package(path: str | Path) -> bool:
     """Whether a path has the name of an SSP package or of a system description."""
-    return Path(path).suffix in SUFFIXES
+    return Path(path).suffix.lower() in SUFFIXES
 
 
 class _Reader:
