@@ -170,12 +170,12 @@ class _Reader:
     def values(self, inputs: Sequence[Variable], connected: Collection[str]) -> dict[str, float | str]:
         """Return the values of variables; those that name nothing are noted."""
         found: dict[str, float | str] = {}
-        own = {v.name: v for v in inputs}
+        own, fed = {v.name: v for v in inputs}, {_title(end) for end in self._steps}
         for name, given in self._given.items():
             targets = list(self._targets(name))
             if name in own:
                 found[name] = self._value(given, own[name])
-            elif not targets:
+            elif not targets and name not in fed:  # what feeds a connector replaces its value
                 self.notes.append(f"the parameter {name} of the package names nothing that can be set")
             for end, source, (factor, offset) in targets:
                 if _title(end) in connected:
