@@ -136,5 +136,9 @@ def _unknown(name: str, info: ModelInfo) -> str:
     if listing.startswith("known") and not near.startswith("known"):
         listing = f"{near.split('?')[0]}? K{listing[1:]}"
     if name.startswith("der("):
+        parts = name[4:-1].split(".")  # components of a system have derivatives of their own
+        ends = (f"{'.'.join(parts[:i])}.der({'.'.join(parts[i:])})" for i in range(1, len(parts)))
+        if own := next((each for each in ends if each in info), ""):
+            return f"unknown signal {name!r}; did you mean {own!r}?"
         listing += "; without a signal that is the rate, use the template ramp_limit and state over and range"
     return f"unknown signal {name!r}; {listing}"

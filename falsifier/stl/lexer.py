@@ -1,8 +1,8 @@
 """Tokens of a formula's text, names of variables among them, and errors that say where and what to write.
 
-Most names of FMU variables need no quotes: ``speed``, ``a.b[1]``, ``x[1,2]``, ``der(x)``, and Modelica names
-whose single quotes are part of the name: ``car.'front left'.v``. Any other name is written in double quotes,
-which are not part of it: ``"G"``, ``"wheel speed"``.
+Most names of FMU variables need no quotes: ``speed``, ``a.b[1]``, ``x[1,2]``, ``der(x)``, that of a component
+``a.der(x)``, and Modelica names whose single quotes are part of the name: ``car.'front left'.v``. Any other
+name is written in double quotes, which are not part of it: ``"G"``, ``"wheel speed"``.
 """
 
 import re
@@ -192,7 +192,11 @@ def scan_name(text: str, start: int) -> tuple[str, int] | None:
     if scan_word(text, start):
         return None
     if path := _PATH_PATTERN.match(text, start):
-        return path[0].replace(" ", "") if "'" not in path[0] else path[0], path.end()
+        name = path[0].replace(" ", "") if "'" not in path[0] else path[0]
+        inner = scan_name(text, path.end() - 3) if name.endswith(".der") else None
+        if inner and inner[0].startswith("der("):  # the derivative of a component, plant.der(x)
+            return name.removesuffix("der") + inner[0], inner[1]
+        return name, path.end()
     return None
 
 

@@ -96,6 +96,8 @@ def test_windows_in_units(text: str, window: stl.Window) -> None:
         ("der(x)", "der(x)"),
         ("der( a.x , 2 )", "der(a.x,2)"),
         ("der(der(x))", "der(der(x))"),
+        ("plant.der( x )", "plant.der(x)"),
+        ("a[1].b.der(c.x,2)", "a[1].b.der(c.x,2)"),
         ("a.b[1].c", "a.b[1].c"),
         ("x[1, 2]", "x[1,2]"),
         ("'front left'.v", "'front left'.v"),
