@@ -127,6 +127,8 @@ def _unknown(name: str, info: ModelInfo) -> str:
     if items := [f"{word} is {v.literals[word]} of {v.name}" for v in info.variables if word in v.literals]:
         told = ", ".join(items[:3])
         return f"unknown signal {name!r}; formulas name items of enumerations by their numbers: {told}"
+    if name in ("time", "t"):
+        return f"unknown signal {name!r}; times are stated by windows: G[3,5] (x <= 1) says from 3 to 5 s"
     # What a reader left out of a model says what to write instead.
     if told := next((note for note in info.notes if note.startswith(f"the output {name} of ")), ""):
         return f"unknown signal {name!r}; {told}"

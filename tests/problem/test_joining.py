@@ -363,6 +363,14 @@ def test_a_string_keeps_the_text_that_was_typed_and_a_number_may_be_typed_in_any
     assert options_from(changes) == [("--set", text) for text in ("label=007", "note=nan", "mass=1.50e3")]
 
 
+def test_the_time_is_told_by_windows() -> None:
+    for name in ("time", "t"):
+        with pytest.raises(
+            SpecError, match=rf"unknown signal '{name}'; times are stated by windows: G\[3,5\]"
+        ):
+            Problem.from_fmu(fixture("Echo_2"), f"G ({name} > 3 -> out_Real <= 1)")
+
+
 def test_derivatives_of_components_are_named_like_their_other_variables() -> None:
     info = System({"p": fixture("Plant_2")}).info
     experiment = Experiment(1.0, 0.1, ())
