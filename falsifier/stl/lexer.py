@@ -29,6 +29,10 @@ _QUOTED_PATTERN = re.compile(r'"((?:[^"\\]|\\.)+)"', re.DOTALL)
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 # The whole part of a number that is written with a decimal comma.
 _DECIMAL_COMMA = re.compile(r"(?<![\w.])\d+(?=,\d)")
+# A window as other tools write it, up to the colon.
+_BOUNDS_WITH_COLON = re.compile(
+    r"(?:[GFU]|always|eventually|until|alw|ev)_?\s*\[\s*[\d.eE+-]+\s*(?:[um]?s|min|h)?\s*:\Z"
+)
 _SYMBOL = re.compile(r"<->|<=>|->|=>|<=|>=|==|!=|&&|\|\||[-+*/^<>!&|()\[\],]")
 _SPELLINGS = {
     "<=>": "<->", "=>": "->", "|": "or", "||": "or", "&": "and", "&&": "and", "!": "not",
@@ -170,6 +174,8 @@ def _token(text: str, position: int) -> Token:
     hint = _HINTS.get(
         text[position], "it has no meaning in a formula; put names that contain it in double quotes"
     )
+    if _BOUNDS_WITH_COLON.search(text, 0, position + 1):
+        hint = "write the bounds of windows with a comma: [a,b]"
     raise syntax_error(text, f"unexpected character {text[position]!r}", position, hint)
 
 
