@@ -176,6 +176,8 @@ def _token(text: str, position: int) -> Token:
     )
     if _BOUNDS_WITH_COLON.search(text, 0, position + 1):
         hint = "write the bounds of windows with a comma: [a,b]"
+    elif text[position] == "." and '"' in (text[position - 1 : position], text[position + 1 : position + 2]):
+        hint = "put the whole name in one pair of double quotes"
     raise syntax_error(text, f"unexpected character {text[position]!r}", position, hint)
 
 

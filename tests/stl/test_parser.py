@@ -216,6 +216,8 @@ MISTAKES = [
     ("a -> <>[0,3] (x <= 3)", 6, "<> is written F"),
     ("a <= b\nand c <== d", 16, "=="),
     ("x # 1", 3, "quotes"),
+    ('plant."wheel speed" <= 3', 6, "whole name in one pair"),
+    ('"big plant".x <= 3', 12, "whole name in one pair"),
     ("(" * 500 + "b" + ")" * 500, 101, "split"),
     ("b" + " and b" * 300, 1, "split"),
 ]
