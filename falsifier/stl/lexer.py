@@ -115,7 +115,7 @@ def tokenize(text: str) -> list[Token]:
 
 def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaError:
     """Return an error that shows the line, a caret under the position (counted from 0) and a hint."""
-    if any(number.end() == position for number in _DECIMAL_COMMA.finditer(text)):
+    if any(position in (number.start(), number.end()) for number in _DECIMAL_COMMA.finditer(text)):
         hint = "write decimals with a point"
     start = text.rfind("\n", 0, position) + 1
     end = text.find("\n", position)
