@@ -74,7 +74,10 @@ _MISPLACED = {
     ")": "there is nothing between the parentheses, or one parenthesis too many",
     "*": "write powers as x^y", "|": "write absolute values as abs(x)",
 }  # fmt: skip
-JOIN = "join two formulas with and, or, ->; numbers and signals with + - * /; write numbers without units"
+JOIN = (
+    "join two formulas with and, or, ->; numbers and signals with + - * /; write numbers without units, and "
+    "names with blanks in double quotes"
+)
 # Maximum number of characters of a line that errors show.
 _SHOWN_LINE = 160
 
