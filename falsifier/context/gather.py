@@ -128,8 +128,8 @@ def _read(path: Path, name: str, sentry: Sentry | None) -> _File:
     text = content.decode("utf-8", "replace") if is_diagram else text_of(content)
     if text is None:
         raise SpecError(
-            f"context {name}: expected text or a Simulink file, found binary data; save it as text in "
-            "UTF-8, or leave it out"
+            f"context {name}: expected text or a Simulink file, found binary data, or a PDF or RTF document; "
+            "save it as text in UTF-8, or leave it out"
         )
     if sentry is not None and is_package:
         for part, packed in read_parts(path).items():
