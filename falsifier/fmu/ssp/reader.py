@@ -112,6 +112,8 @@ class _Reader:
         # Where the value of a connector comes from, in the direction of the signal.
         self._steps: dict[End, tuple[End, Transformation]] = {}
         self._units: dict[str, Unit] = {}
+        # Those that an FMU defines, by component: another may mean something else by the same name.
+        self._own_units: dict[str, Mapping[str, Unit]] = {}
         self._given: dict[str, Given] = {}
 
     def walk_file(self, package: Package, at: str, above: tuple[Path, ...]) -> None:
@@ -258,7 +260,8 @@ class _Reader:
         try:
             component = self.components[at] = Component(file, None, _INTERFACES[implementation])
             description = self._descriptions[at] = describe(file, component.sha256)
-            self._units = {**read_structure(file, component.sha256).units, **self._units}
+            self._own_units[at] = read_structure(file, component.sha256).units
+            self._units = {**self._own_units[at], **self._units}
         except ModelError as error:
             raise self._wrong(f"the component {at}: {source}: {error}") from None
         self._declare(element, at, {v.name: v for v in description.info.variables})
@@ -336,11 +339,11 @@ class _Reader:
             raise self._wrong(
                 f"{_title(end)} is fed by the output {_title(at)}, which nothing feeds; connect that one too"
             )
-        factor, offset, unit, before = 1.0, 0.0, self._connectors[at][1], at
+        factor, offset, unit, before, stating = 1.0, 0.0, self._connectors[at][1], at, at
         for target, change in reversed(chain):
             wanted = self._connectors[target][1]
             if not change.suppress:
-                found = conversion(unit, wanted, (self._units, self._units))
+                found = conversion(unit, wanted, (self._units_of(stating), self._units_of(target)))
                 if found is None:
                     raise self._wrong(
                         f"{_title(before)} is in {unit}, {_title(target)} in {wanted}; the package defines "
@@ -349,8 +352,11 @@ class _Reader:
                 factor, offset = found[0] * factor, found[0] * offset + found[1]
             factor = change.factor * factor
             offset = change.factor * offset + change.offset
-            unit, before = wanted or unit, target
+            unit, before, stating = wanted or unit, target, target if wanted else stating
         return at, (factor, offset)
+
+    def _units_of(self, end: End) -> Mapping[str, Unit]:
+        return {**self._units, **self._own_units.get(end[0], {})}
 
     def _joint(self, one: Variable, other: Variable) -> Variable:
         both = zip(one.limits, other.limits, strict=True)

@@ -176,6 +176,17 @@ def test_outputs_of_the_whole_that_are_no_output_of_a_component_are_noted(tmp_pa
     assert "the output height of the package is left out: nothing feeds it" in model.info.notes
 
 
+def test_each_fmu_has_its_own_units_even_if_others_mean_something_else_by_a_name(tmp_path: Path) -> None:
+    gain = altered(path("Gain_2mm"), tmp_path / "g.fmu", lambda x: x.replace(b'r="0.001"', b'r="0.004"'))
+    pis = "".join(PI.replace('"pi"', f'"{n}"').replace('"m"', '"mm"') for n in ("one", "two"))
+    pis = pis.replace("Gain_2.fmu", "Gain_2mm.fmu", 1).replace("Gain_2.fmu", "other.fmu")
+    wires = "".join(FEEDBACK.split("/>", 1)[1].replace('"pi"', f'"{n}"') for n in ("one", "two"))
+    more: dict[str, str | bytes] = {"resources/other.fmu": gain.read_bytes()}
+    file = write(tmp_path / "u.ssp", structure(system(PLANT + pis, wires)), "Plant_2", "Gain_2mm", more=more)
+    factors = [link.factor for link in read_package(file).network.links]
+    assert factors == pytest.approx([1000.0, 250.0])
+
+
 def plant(old: str, new: str) -> str:
     """A structure with the plant alone, in which something is replaced."""
     return structure(system(PLANT.replace(old, new)))
