@@ -98,7 +98,7 @@ def static_findings(problem: Problem) -> Iterator[LintFinding]:
         yield LintFinding(name, "margin", "", *hidden)
     yield from _windows(problem)
     for predicate, text in unit_conflicts(formula, problem.info, defined_units(problem.model)):
-        yield LintFinding(name, "units", str(predicate), text, "convert one side in the formula")
+        yield LintFinding(name, "units", str(predicate), text, "give both sides the same unit")
     for part in formula.walk():
         if isinstance(part, Bare):
             text = f"{part.left} stands alone like a Boolean, but is a number, so that it means {part}"
