@@ -67,7 +67,10 @@ def gather(
         ModelError: if an archive is damaged or dangerous.
     """
     sentry = Sentry(checked) if is_told else None
-    found = [_read(Path(name), name, sentry) for name in dict.fromkeys(files)]
+    once: dict[Path, str] = {}
+    for name in files:  # a spec and an option may name one file in different ways
+        once.setdefault(Path(name).resolve(), name)
+    found = [_read(Path(name), name, sentry) for name in once.values()]
     notes = []
     for fmu in fmus:
         for entry, content in inside(fmu):
