@@ -20,6 +20,7 @@ from falsifier.problem.source import ProblemSource, source_of
 from falsifier.problem.unit_check import defined_units, unit_conflicts
 from falsifier.search.vacuity import hidden_margin
 from falsifier.stl import Formula
+from falsifier.stl.expression import Name, Number
 from falsifier.stl.formula import And, Bare, Or, Temporal, Until, Window
 from falsifier.stl.implication import implies
 from falsifier.stl.intervals import Interval, decided
@@ -92,11 +93,12 @@ def static_findings(problem: Problem) -> Iterator[LintFinding]:
     name, formula = problem.name, problem.requirement.formula
     for part, holds in decided(formula, ranges_of(problem)):
         yield _decided(problem, part, holds=holds)
+    yield from _unequal(problem)
     if hidden := hidden_margin(problem):
         yield LintFinding(name, "margin", "", *hidden)
     yield from _windows(problem)
     for predicate, text in unit_conflicts(formula, problem.info, defined_units(problem.model)):
-        yield LintFinding(name, "units", str(predicate), text, "convert one side in the formula")
+        yield LintFinding(name, "units", str(predicate), text, "give both sides the same unit")
     for part in formula.walk():
         if isinstance(part, Bare):
             text = f"{part.left} stands alone like a Boolean, but is a number, so it means {part}"
@@ -137,6 +139,24 @@ def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
         what = "this part always holds" if holds else "this part never holds"
         advice = "check its threshold and direction, or leave it out"
     return LintFinding(problem.name, "always" if holds else "never", str(part), f"{what}, {because}", advice)
+
+
+def _unequal(problem: Problem) -> Iterator[LintFinding]:
+    """Yield comparisons with a number in range that an integer, Boolean or enumeration never is."""
+    ranges = ranges_of(problem)
+    for part in dict.fromkeys(problem.requirement.formula.predicates):
+        for one, other in permutations((part.left, part.right)):
+            if (
+                part.operator not in ("==", "!=")
+                or not isinstance(one, Name)
+                or not isinstance(other, Number)
+            ):
+                continue
+            wrong = problem.info[one.name].expected(other.value)
+            if wrong and ranges[one.name].low <= other.value <= ranges[one.name].high:
+                kind: LintKind = "never" if part.operator == "==" else "always"
+                text = f"this part {kind} holds: {wrong}"
+                yield LintFinding(problem.name, kind, str(part), text, "write a number that it can be")
 
 
 def _windows(problem: Problem) -> Iterator[LintFinding]:

@@ -83,11 +83,14 @@ def of_text(text: str, shown: str, signals: Collection[str]) -> Readable:
         text = _without_tags(text)
     lines = [line.rstrip() for line in text.splitlines()]
     headings = [line for line in lines if _HEADING.match(line)]
-    named = list(_naming(text, r"\n\s*\n", [name for name in signals if len(name) > 1]))
+    known = [name for name in signals if len(name) > 1]
+    named = list(_naming(text, r"\n\s*\n", known))
     forms = (
         ("whole", "\n".join(lines).strip()),
         ("headings, and paragraphs that name a signal", "\n".join([*headings, "", *named]).strip()),
         ("paragraphs that name a signal", "\n".join(named)),
+        # Tables and logs are one paragraph.
+        ("lines that name a signal", "\n".join(_naming(text, "\n", known))),
         ("headings", "\n".join(headings)),
         ("size only", counted(len(lines), "line")),
     )

@@ -26,6 +26,8 @@ _MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+# PDF and RTF: what they show stands between codes, even if these have no control characters.
+_CODED = (b"%PDF-", rb"{\rtf")
 # Control characters that no editor writes: what is not UTF-8 and has them is binary.
 _CONTROL = re.compile(r"[\x01-\x08\x0e-\x19\x1c-\x1f]")
 
@@ -71,11 +73,13 @@ def _may_tell(name: PurePosixPath) -> bool:
 def text_of(content: bytes) -> str | None:
     """Return the text of a file by the mark it begins with, else UTF-8, Windows-1252 or Latin-1.
 
-    None for binary data.
+    None for binary data, and for PDF and RTF.
 
     >>> text_of("5 K".encode("utf-16")), text_of(bytes([53, 176])), text_of(bytes(4))
     ('5 K', '5°', None)
     """
+    if content.startswith(_CODED):
+        return None
     encoding = next((name for mark, name in _MARKS if content.startswith(mark)), "")
     if encoding:
         text = _decoded(content, encoding)

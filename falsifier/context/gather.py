@@ -67,7 +67,10 @@ def gather(
         ModelError: if an archive is damaged or dangerous.
     """
     sentry = Sentry(checked) if is_told else None
-    found = [_read(Path(name), name, sentry) for name in dict.fromkeys(files)]
+    once: dict[Path, str] = {}
+    for name in files:  # a spec and an option may name one file in different ways
+        once.setdefault(Path(name).resolve(), name)
+    found = [_read(Path(name), name, sentry) for name in once.values()]
     notes = []
     for fmu in fmus:
         for entry, content in inside(fmu):
@@ -128,8 +131,8 @@ def _read(path: Path, name: str, sentry: Sentry | None) -> _File:
     text = content.decode("utf-8", "replace") if is_diagram else text_of(content)
     if text is None:
         raise SpecError(
-            f"context {name}: expected text or a Simulink file, found binary data; save it as text in "
-            "UTF-8, or leave it out"
+            f"context {name}: expected text or a Simulink file, found binary data, or a PDF or RTF document; "
+            "save it as text in UTF-8, or leave it out"
         )
     if sentry is not None and is_package:
         for part, packed in read_parts(path).items():

@@ -59,7 +59,7 @@ _IN_TEXT = re.compile(
 # A value given to something that is named like a secret, as in settings and scripts.
 _ASSIGNED = re.compile(
     r"""(?ix) \b (?:\w*[_-])? (?:(?:client|shared)?secret|(?:shared)?access[_-]?key|(?:secret|account|api
-    |private|encryption)[_-]?key|password|passwd|passphrase|(?:auth|access|api|bearer|refresh)[_-]?token
+    |private|encryption)[_-]?key|passwor[dt]|kennwort|passwd|passphrase|(?:auth|access|api|bearer|refresh)[_-]?token
     |credentials?|authorization) ["']? (?:\s*+ (?::?=|:) \s*+ | >) (?!mailto:)
     # A value that a program reads elsewhere is none: argv[1], os.environ, config.password.
     (?!(?:argv|args|options|params|config|settings|self|this|os|env|environ|process|getenv)\b\s*+(?:[.\[(]|->))
@@ -79,7 +79,7 @@ _UNNAMED = (_VALUE, _ASSIGNED, _STATED)
 # Whatever the patterns above find has one of these: a file of some MB is searched for them in much less time.
 _LISTED_HINTS = """
     sk- pk- rk- hf gsk pplx nvapi xai aiza github_pat_ gho_ ghp_ ghs_ ghu_ ghr_ glpat- xox akia asia
-    _live_ _test_ npm_ key :// eyj secret pass token credential authorization _pwd _pat
+    _live_ _test_ npm_ key :// eyj secret pass kennwort token credential authorization _pwd _pat
 """
 _HINTS = tuple(_LISTED_HINTS.split())
 # Environment variables whose values are removed from texts: fewer than those that are kept from FMUs, because

@@ -66,7 +66,7 @@ def find_spec(target: str) -> tuple[Path, str | None]:
         if name in requirements:
             return path, name
         names.extend(requirements)
-    if (fmu := target.rpartition(":")[0]).endswith(MODEL_FILES):
+    if (fmu := target.rpartition(":")[0]).lower().endswith(MODEL_FILES):
         raise SpecError(f"{target}: an FMU has no requirements of its own; {_stating(fmu)}")
     if not target:
         raise SpecError("the target is empty; give a spec file, an FMU or a bundled name")

@@ -89,7 +89,7 @@ def _parameter(name: str, info: ModelInfo) -> Variable:
 def _check_unconnected(name: str, info: ModelInfo) -> None:
     source = next((source for source, target in info.connections if target == name), None)
     if source is not None:
-        raise SpecError(f"this input is connected to {source}; remove this section or the connection")
+        raise SpecError(f"this input is connected to {source}; leave it out, or remove the connection")
 
 
 def _variable(name: str, variables: Iterable[Variable], otherwise: str) -> Variable:

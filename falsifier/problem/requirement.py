@@ -127,11 +127,20 @@ def _unknown(name: str, info: ModelInfo) -> str:
     if items := [f"{word} is {v.literals[word]} of {v.name}" for v in info.variables if word in v.literals]:
         told = ", ".join(items[:3])
         return f"unknown signal {name!r}; formulas name items of enumerations by their numbers: {told}"
+    if name in ("time", "t"):
+        return f"unknown signal {name!r}; times are stated by windows: G[3,5] (x <= 1) says from 3 to 5 s"
+    # What a reader left out of a model says what to write instead.
+    if told := next((note for note in info.notes if note.startswith(f"the output {name} of ")), ""):
+        return f"unknown signal {name!r}; {told}"
     usual = [v.name for v in (*info.observables, *info.inputs) if v.kind != "string"]
     listing = did_you_mean(name, usual)
     near = did_you_mean(name, (v.name for v in info.variables))
     if listing.startswith("known") and not near.startswith("known"):
         listing = f"{near.split('?')[0]}? K{listing[1:]}"
     if name.startswith("der("):
+        parts = name[4:-1].split(".")  # components of a system have derivatives of their own
+        ends = (f"{'.'.join(parts[:i])}.der({'.'.join(parts[i:])})" for i in range(1, len(parts)))
+        if own := next((each for each in ends if each in info), ""):
+            return f"unknown signal {name!r}; did you mean {own!r}?"
         listing += "; without a signal that is the rate, use the template ramp_limit and state over and range"
     return f"unknown signal {name!r}; {listing}"

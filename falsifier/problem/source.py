@@ -42,7 +42,7 @@ class Target:
         path, colon, requirement = text.partition(".toml:")
         if colon or text.endswith(".toml"):
             return cls("spec", f"{path.removesuffix('.toml')}.toml", requirement)
-        if text.endswith(MODEL_FILES):
+        if text.lower().endswith(MODEL_FILES):
             return cls("fmu", text)
         return cls("bundled", requirement=text.partition(":")[2])
 

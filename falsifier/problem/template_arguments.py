@@ -32,7 +32,7 @@ def _term(text: str | float) -> str | float:
             raise ValueError("expected a finite number")
         return float(text)
     try:
-        formula = parse(f"({text}) <= 0")
+        formula = parse(f"{text} <= 0")  # at its beginning, so that errors point at the right place
     except FormulaError as error:
         raise ValueError(str(error)) from None
     if not isinstance(formula, Predicate):

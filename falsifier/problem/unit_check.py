@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping
 
 from falsifier.core.model import Model, ModelInfo
-from falsifier.fmu import FmuModel
+from falsifier.fmu import FmuModel, System
 from falsifier.fmu.description.structure import Units, conversion, is_known, read_structure
 from falsifier.stl import Formula
 from falsifier.stl.expression import Arithmetic, Call, Expression, Number, unit_of
@@ -41,7 +41,11 @@ _SPELLINGS = {
 
 
 def defined_units(model: Model) -> Units:
-    """Return the units that a model defines itself; empty if it is no FMU that can define any."""
+    """Return the units that a model defines itself, a system those of its FMUs; empty if it cannot."""
+    if isinstance(model, System):
+        tables = [read_structure(each.fmu, each.sha256).units for each in model.parts.values()]
+        agreed = (n for table in tables for n in table if all(t.get(n, table[n]) == table[n] for t in tables))
+        return {name: next(table[name] for table in tables if name in table) for name in agreed}
     if not isinstance(model, FmuModel) or not model.info.fmi_version.startswith(("2", "3")):
         return {}
     return read_structure(model.path, model.sha256).units

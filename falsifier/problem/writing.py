@@ -18,6 +18,7 @@ from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import in_unit
 from falsifier.errors import FormulaError, SpecError
 from falsifier.fmu import is_package, read_info, read_package
+from falsifier.fmu.description.structure import conversion
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.joining import join
 from falsifier.problem.loading import find_spec
@@ -94,10 +95,12 @@ def _components(fmus: Mapping[str, Path], info: ModelInfo) -> Iterator[str]:
         )
     lines = ["INPUT = OUTPUT; an input that is connected needs no [inputs] section below:"]
     for v in info.inputs:
-        component, local = v.name.removesuffix(_local(v.name)), _local(v.name)
-        others = [o.name for o in info.outputs if o.kind == v.kind and not o.name.startswith(component)]
-        near = [o for o in others if _local(o) == local]
-        shown = " or ".join(f'"{o}"' for o in near or others[:_SHOWN_VARIABLES])
+        component = max((n for n in fmus if v.name.startswith(f"{n}.")), key=len)
+        others = [o for o in info.outputs if o.kind == v.kind and not o.name.startswith(f"{component}.")]
+        # Units that only the FMUs define might be converted, too: these outputs come if there are no others.
+        fitting = [o for o in others if conversion(o.unit, v.unit, ({}, {}))] or others
+        near = [o for o in fitting if _local(o.name) == _local(v.name)] or fitting[:_SHOWN_VARIABLES]
+        shown = " or ".join(f'"{o.name}"' for o in near)
         lines.append(f'"{v.name}" = {shown or "OUTPUT"}')
     yield "\n".join(["[connections]", *map(_comment, lines)])
 
@@ -230,7 +233,7 @@ def subject_of(target: str) -> Subject:
         SpecError: if the target is none of these.
         ModelError: if the FMU cannot be read.
     """
-    if target.endswith(MODEL_FILES):
+    if target.lower().endswith(MODEL_FILES):
         fmu = Path(target)
         if not fmu.is_file():
             raise SpecError(f"{absent(fmu)}; give the path of an FMU or SSP package, or a spec")

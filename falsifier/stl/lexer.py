@@ -1,8 +1,8 @@
 """Tokens of a formula's text, names of variables among them, and errors that say where and what to write.
 
-Most names of FMU variables need no quotes: ``speed``, ``a.b[1]``, ``x[1,2]``, ``der(x)``, and Modelica names
-whose single quotes are part of the name: ``car.'front left'.v``. Any other name is written in double quotes,
-which are not part of it: ``"G"``, ``"wheel speed"``.
+Most names of FMU variables need no quotes: ``speed``, ``a.b[1]``, ``x[1,2]``, ``der(x)``, that of a component
+``a.der(x)``, and Modelica names whose single quotes are part of the name: ``car.'front left'.v``. Any other
+name is written in double quotes, which are not part of it: ``"G"``, ``"wheel speed"``.
 """
 
 import re
@@ -29,6 +29,10 @@ _QUOTED_PATTERN = re.compile(r'"((?:[^"\\]|\\.)+)"', re.DOTALL)
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 # The whole part of a number that is written with a decimal comma.
 _DECIMAL_COMMA = re.compile(r"(?<![\w.])\d+(?=,\d)")
+# A window as other tools write it, up to the colon.
+_BOUNDS_WITH_COLON = re.compile(
+    r"(?:[GFU]|always|eventually|until|alw|ev)_?\s*\[\s*[\d.eE+-]+\s*(?:[um]?s|min|h)?\s*:\Z"
+)
 _SYMBOL = re.compile(r"<->|<=>|->|=>|<=|>=|==|!=|&&|\|\||[-+*/^<>!&|()\[\],]")
 _SPELLINGS = {
     "<=>": "<->", "=>": "->", "|": "or", "||": "or", "&": "and", "&&": "and", "!": "not",
@@ -70,7 +74,10 @@ _MISPLACED = {
     ")": "there is nothing between the parentheses, or one parenthesis too many",
     "*": "write powers as x^y", "|": "write absolute values as abs(x)",
 }  # fmt: skip
-JOIN = "join two formulas with and, or, ->; numbers and signals with + - * /; write numbers without units"
+JOIN = (
+    "join two formulas with and, or, ->; numbers and signals with + - * /; write numbers without units, and "
+    "names with blanks in double quotes"
+)
 # Maximum number of characters of a line that errors show.
 _SHOWN_LINE = 160
 
@@ -111,7 +118,7 @@ def tokenize(text: str) -> list[Token]:
 
 def syntax_error(text: str, problem: str, position: int, hint: str) -> FormulaError:
     """Return an error that shows the line, a caret under the position (counted from 0) and a hint."""
-    if any(number.end() == position for number in _DECIMAL_COMMA.finditer(text)):
+    if any(position in (number.start(), number.end()) for number in _DECIMAL_COMMA.finditer(text)):
         hint = "write decimals with a point"
     start = text.rfind("\n", 0, position) + 1
     end = text.find("\n", position)
@@ -170,6 +177,10 @@ def _token(text: str, position: int) -> Token:
     hint = _HINTS.get(
         text[position], "it has no meaning in a formula; put names that contain it in double quotes"
     )
+    if _BOUNDS_WITH_COLON.search(text, 0, position + 1):
+        hint = "write the bounds of windows with a comma: [a,b]"
+    elif text[position] == "." and '"' in (text[position - 1 : position], text[position + 1 : position + 2]):
+        hint = "put the whole name in one pair of double quotes"
     raise syntax_error(text, f"unexpected character {text[position]!r}", position, hint)
 
 
@@ -192,7 +203,11 @@ def scan_name(text: str, start: int) -> tuple[str, int] | None:
     if scan_word(text, start):
         return None
     if path := _PATH_PATTERN.match(text, start):
-        return path[0].replace(" ", "") if "'" not in path[0] else path[0], path.end()
+        name = path[0].replace(" ", "") if "'" not in path[0] else path[0]
+        inner = scan_name(text, path.end() - 3) if name.endswith(".der") else None
+        if inner and inner[0].startswith("der("):  # the derivative of a component, plant.der(x)
+            return name.removesuffix("der") + inner[0], inner[1]
+        return name, path.end()
     return None
 
 

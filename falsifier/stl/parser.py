@@ -278,8 +278,9 @@ class _Parser:
         return token.text, unit
 
     def _looks_like_open_window(self) -> bool:
-        following = self.tokens[self.index + 1 : self.index + 3]
-        return [t.kind for t in following] == ["number", "symbol"] and following[1].text == ","
+        first, comma, _, last = (self.tokens[self.index + 1 :] + self.tokens[-1:] * 4)[:4]
+        ends = last.text in (")", "]") or last.kind == "name"  # the unit of a bound; else (1,5 < x)
+        return first.kind == "number" and comma.text == "," and ends
 
     # -- what went wrong ---------------------------------------------------------------------------------
 

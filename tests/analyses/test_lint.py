@@ -57,8 +57,10 @@ FOUND = [
     ("G[0,20] (speed <= 120 and speed <= 130)", "implied", "speed <= 130", "which implies it"),
     ("F[0,9] (speed >= 90) or F[0,5] (speed >= 90)", "window", "F[0,5] (speed >= 90)", "which it implies"),
     ("G[0,20] speed", "boolean", "speed", "so it means speed >= 0.5"),
-    ("G[0,20] (speed - rpm <= 5)", "units", "speed - rpm <= 5", "speed is in mph, rpm in "),
+    ("G[0,20] (speed - rpm <= 5)", "units", "speed - rpm <= 5", "only give both sides the same unit"),
     *((formula, "", "", "") for formula in ("G[0,20] (gear == 3)", "G[0,20] (gear != 3)", "F (gear == 3)")),
+    ("F[0,9] (gear == 2.5)", "never", "gear == 2.5", "expected an integer for 'gear'"),
+    ("G[0,9] (1.5 != gear or speed <= 9)", "always", "1.5 != gear", "always holds: expected an integer"),
     ("G[0,60] (speed <= 5)", "invalid", "", "simulate longer"),
     ("G[0,20] (sped <= 5)", "invalid", "", "did you mean 'speed'"),
 ]  # fmt: skip

@@ -46,7 +46,17 @@ def test_marks_of_big_endian_text(mark: bytes) -> None:
     assert text_of(mark + "5 K".encode("utf-16-be" if len(mark) == 2 else "utf-32-be")) == "5 K"
 
 
-@pytest.mark.parametrize("content", [b"\x7fELF\0\1", b"\xff\xfe\0", b"\xef\xbb\xbf\xff", b"\xff\xfe\0\0\xff"])
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"%PDF-1.7\n1 0 obj",
+        b"{\\rtf1\\ansi x}",
+        b"\x7fELF\0\1",
+        b"\xff\xfe\0",
+        b"\xef\xbb\xbf\xff",
+        b"\xff\xfe\0\0\xff",
+    ],
+)
 def test_binary_data_is_no_text(content: bytes) -> None:
     assert text_of(content) is None
 

@@ -46,6 +46,22 @@ def test_a_file_that_is_too_long_is_summarized(tmp_path: Path) -> None:
     assert excerpt.text == "# Title\n\nThe power is limited."
 
 
+def test_a_file_that_is_named_in_two_ways_is_told_once(tmp_path: Path) -> None:
+    path = tmp_path / "notes.md"
+    path.write_text("The power is limited.")
+    files = [str(path), f"{tmp_path}/../{tmp_path.name}/notes.md"]
+    context = gather(files, [], seeds=["trips"], signals=SIGNALS)
+    assert [each.path for each in context.excerpts] == [str(path)]
+
+
+def test_of_a_long_table_the_lines_that_name_a_signal_are_told(tmp_path: Path) -> None:
+    path = tmp_path / "levels.csv"
+    path.write_text("name;level\n" + "other;1\n" * 2000 + "power;0.8\n" + "other;2\n" * 2000)
+    (excerpt,) = read(path).excerpts
+    assert excerpt.form == "lines that name a signal, because the rest is too long"
+    assert excerpt.text == "power;0.8"
+
+
 def test_all_files_together_fit(tmp_path: Path) -> None:
     paths = [tmp_path / f"{i}.md" for i in range(4)]
     for path in paths:

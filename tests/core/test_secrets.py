@@ -83,6 +83,8 @@ def test_the_line_of_a_held_secret_is_found(monkeypatch: pytest.MonkeyPatch) -> 
         '<P Name="password">hunter22</P>',
         '#define WIFI_PASSWORD "hunter22"',
         "// the password is hunter22",
+        "Passwort: hunter22",
+        "DB-Kennwort = 'hunter22'",
         "-----BEGIN PGP PRIVATE KEY BLOCK-----",
         "PuTTY-User-Key-File-3: ssh-ed25519",
         "sk_live_abcdefgh12345678",
@@ -105,6 +107,7 @@ def test_secrets_of_settings_sources_and_key_files_are_found(line: str) -> None:
     "line",
     [
         "the password is required for entry",
+        "das Passwort wird beim Start verlangt",
         "tokens: 4000",
         "API_KEY=...",
         "keys = [1, 2]",

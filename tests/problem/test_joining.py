@@ -11,7 +11,7 @@ import pytest
 from falsifier.core.files import bundled
 from falsifier.core.model import Experiment, ModelInfo, Variable
 from falsifier.errors import SpecError
-from falsifier.fmu import read_info
+from falsifier.fmu import System, read_info
 from falsifier.problem.joining import Joined, join, join_formula, placed
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
@@ -361,3 +361,21 @@ def test_a_string_keeps_the_text_that_was_typed_and_a_number_may_be_typed_in_any
     found = placed(changes, info).parameters
     assert [section.value for section in found.values()] == ["007", "nan", 1500.0]
     assert options_from(changes) == [("--set", text) for text in ("label=007", "note=nan", "mass=1.50e3")]
+
+
+def test_the_time_is_told_by_windows() -> None:
+    for name in ("time", "t"):
+        with pytest.raises(
+            SpecError, match=rf"unknown signal '{name}'; times are stated by windows: G\[3,5\]"
+        ):
+            Problem.from_fmu(fixture("Echo_2"), f"G ({name} > 3 -> out_Real <= 1)")
+
+
+def test_derivatives_of_components_are_named_like_their_other_variables() -> None:
+    info = System({"p": fixture("Plant_2")}).info
+    experiment = Experiment(1.0, 0.1, ())
+    assert parse_requirement("G (p.der(x) <= 1)", info, experiment).signals == ("p.der(x)",)
+    with pytest.raises(SpecError, match=r"unknown signal 'der\(p\.x\)'; did you mean 'p\.der\(x\)'\?"):
+        parse_requirement("G (der(p.x) <= 1)", info, experiment)
+    with pytest.raises(SpecError, match="use the template ramp_limit"):
+        parse_requirement("G (der(p.y) <= 1)", info, experiment)

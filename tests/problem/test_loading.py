@@ -7,6 +7,8 @@ from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.loading import load_problem, load_problems, load_source
 from falsifier.problem.problem import Problem
+from falsifier.problem.writing import subject_of
+from tests.fmu.packages import PLANT, structure, system, write
 from tests.problem.support import AT, GOOD, echo, spec
 
 
@@ -99,6 +101,17 @@ def test_no_spec_is_needed(folder: Path) -> None:
     assert [(r.name, r.low, r.high) for r in named.space.inputs] == [("brake", 0, 325)]
     every = Problem.from_fmu(folder / "AT.fmu", "G[0,20] (speed <= 120)")
     assert [r.name for r in every.space.inputs] == ["throttle", "brake"]
+
+
+def test_endings_of_files_may_be_in_capital_letters(folder: Path) -> None:
+    fmu = folder / "AT.fmu"
+    fmu.rename(folder / "AT.FMU")
+    assert load_problem(f"{folder}/AT.FMU", stl="G (speed <= 9)").model.info.name == "ArchComp.AT"
+    with pytest.raises(SpecError, match="an FMU has no requirements of its own"):
+        load_problem(f"{folder}/AT.FMU:R")
+    package = write(folder / "PLANT.SSP", structure(system(PLANT)), "Plant_2")
+    assert load_problem(str(package), stl="G (plant.y <= 9)", inputs={"plant.u": (0, 1)}, stop_time=1.0)
+    assert [subject_of(f"{folder}/{name}").is_new for name in ("AT.FMU", "PLANT.SSP")] == [True, True]
 
 
 def test_an_input_by_its_name_alone_is_as_the_spec_says(folder: Path) -> None:

@@ -80,7 +80,7 @@ WRONG = [
     (COMPONENTS + REST.replace('"plant.T"', "plant.T"), 'written in quotes: "plant.T" = ...'),
     (
         COMPONENTS + CONNECTIONS + REST.replace('"pi.r"', '"plant.u"'),
-        "inputs.plant.u: this input is connected to pi.y; remove this section or the connection",
+        "inputs.plant.u: this input is connected to pi.y; leave it out, or remove the connection",
     ),
     (COMPONENTS + CONNECTIONS + REST.replace('"plant.T"', '"plant.u"'), "parameters.plant.u: this input"),
     (COMPONENTS + REST.replace('"pi.r"', '"pi.x"'), "inputs.pi.x: the system has no such input; did you"),

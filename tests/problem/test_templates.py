@@ -146,6 +146,7 @@ def test_what_does_not_fit_the_simulation_is_an_error(template: str, message: st
         ("ramp_limit signal=x limit=1 over=1", "over and range together"),
         ("ramp_limit signal='x - y' limit=1", "has no der"),
         ("ramp_limit signal=x limit=1 over=1 range=[1,0]", "low < high"),
+        ("stays_within signal='oil level' low=0", r"'level' .*\(position 5\)\n  oil .*\n.*\n.*double quotes"),
     ],
 )
 def test_wrong_arguments_are_named(template: str, message: str) -> None:

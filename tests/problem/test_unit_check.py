@@ -1,11 +1,14 @@
+from pathlib import Path
+
 import pytest
 
 from falsifier.core.model import ModelInfo, Variable
-from falsifier.fmu import FmuModel
+from falsifier.fmu import FmuModel, System
 from falsifier.fmu.description.structure import Unit
 from falsifier.problem.unit_check import defined_units, factor_and_offset, unit_conflicts
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
+from tests.fmu.fixtures import altered, path as fixture
 from tests.problem.support import AT
 
 UNITS_OF = {
@@ -75,3 +78,11 @@ def test_units_are_known_by_what_people_write(one: str, other: str, factor: floa
 def test_fmus_define_units_and_other_models_do_not() -> None:
     assert "mph" in defined_units(FmuModel(AT))
     assert defined_units(lag_problem().model) == {}
+
+
+def test_a_system_has_the_units_of_its_fmus_unless_they_differ(tmp_path: Path) -> None:
+    other = altered(fixture("Gain_2mm"), tmp_path / "other.fmu", lambda x: x.replace(b'r="0.001"', b'r="9"'))
+    one, both = ({"a": AT, "b": fixture("Gain_2mm")}, {"b": fixture("Gain_2mm"), "c": other})
+    known = defined_units(System(one))
+    assert known["mm"] == defined_units(FmuModel(fixture("Gain_2mm")))["mm"] and "mph" in known
+    assert set(defined_units(System(both))) == {"m"}

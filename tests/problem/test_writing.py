@@ -90,6 +90,18 @@ def test_parameters_beyond_the_first_ten_are_counted() -> None:
     assert "# ... and 3 more, which falsifier info lists\n" in text
 
 
+def test_outputs_of_a_fitting_unit_are_offered_for_the_inputs_of_a_system() -> None:
+    ends = (
+        Variable("c.a.v", unit="km/h", causality="input"),
+        Variable("c.a.odd", unit="furlong", causality="input"),
+        Variable("c.out", unit="m/s", causality="output"),
+        *(Variable(f"p.{name}", unit=unit, causality="output") for name, unit in (("x", "m"), ("w", "m/s"))),
+    )
+    text = starter_spec({"c": Path("c.fmu"), "p": Path("p.fmu")}, ModelInfo("m", variables=ends))
+    assert '# "c.a.v" = "p.w"\n' in text, "neither what has another unit nor an output of its own"
+    assert '# "c.a.odd" = "p.x" or "p.w"\n' in text
+
+
 def test_without_outputs_states_are_offered(tmp_path: Path) -> None:
     spec = written("NoOutputs_2dymola", tmp_path)
     assert "# The FMU has no outputs. Requirements may name any variable: x\n" in spec.read_text("utf-8")

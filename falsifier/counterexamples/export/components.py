@@ -189,7 +189,9 @@ def write_package(system: System, stop_time: float, resources: Mapping[str, Path
         ElementTree.register_namespace(short, _NAMESPACE + name)
     root = Element(f"{_SSD}SystemStructureDescription", {"version": "1.0", "name": system.name})
     whole = SubElement(root, f"{_SSD}System", {"name": system.name})
-    _connectors(whole, [v for v in system.info.inputs if network.places[v.name].member == SYSTEM])
+    inputs = [v for v in system.info.inputs if network.places[v.name].member == SYSTEM]
+    named = [replace(system.info[n], causality="output", alias_of="") for n, _ in system.frame.outputs]
+    _connectors(whole, (*inputs, *named))
     _bindings(whole, system, [f"resources/{name}" for name in resources if name.endswith(".ssv")])
     elements = SubElement(whole, f"{_SSD}Elements")
     for member in network.members:
@@ -205,6 +207,11 @@ def write_package(system: System, stop_time: float, resources: Mapping[str, Path
     connections = SubElement(whole, f"{_SSD}Connections")
     for link in network.links:
         _connection(connections, link, network)
+    for name, meant in system.frame.outputs:
+        place = network.places[meant]
+        ends = {"startElement": network.members[place.member].name, "startConnector": place.name}
+        ends |= {"endConnector": name, "suppressUnitConversion": "true"}
+        SubElement(connections, f"{_SSD}Connection", ends)
     SubElement(root, f"{_SSD}DefaultExperiment", {"startTime": "0.0", "stopTime": repr(stop_time)})
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as package:
         text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)

@@ -48,7 +48,7 @@ class Package:
         self.shown = shown
         if not path.is_file():
             raise SpecError(f"{absent(path)}; give the path of an .ssp or .ssd file")
-        if path.suffix == ".ssp":
+        if path.suffix.lower() == ".ssp":
             try:
                 path = _unpacked(path, file_hash(path)) / _DESCRIPTION
             except ModelError as error:  # what is wrong with a package is wrong usage

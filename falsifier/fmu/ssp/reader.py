@@ -31,6 +31,7 @@ from falsifier.fmu.ssp.package import (
 )
 from falsifier.fmu.systems.components import Component, Connection, Frame
 from falsifier.fmu.systems.system import System
+from falsifier.stl.lexer import name_text
 
 _FMU_TYPE = "application/x-fmu-sharedlibrary"
 _INTERFACES: Mapping[str, Interface | None] = {"any": None, **{t: i for i, t in INTERFACE_TAGS.items()}}
@@ -89,7 +90,7 @@ def read_package(path: str | Path, *, coupling: Coupling | None = None) -> Syste
 
 def is_package(path: str | Path) -> bool:
     """Whether a path has the name of an SSP package or of a system description."""
-    return Path(path).suffix in SUFFIXES
+    return Path(path).suffix.lower() in SUFFIXES
 
 
 class _Reader:
@@ -111,6 +112,8 @@ class _Reader:
         # Where the value of a connector comes from, in the direction of the signal.
         self._steps: dict[End, tuple[End, Transformation]] = {}
         self._units: dict[str, Unit] = {}
+        # Those that an FMU defines, by component: another may mean something else by the same name.
+        self._own_units: dict[str, Mapping[str, Unit]] = {}
         self._given: dict[str, Given] = {}
 
     def walk_file(self, package: Package, at: str, above: tuple[Path, ...]) -> None:
@@ -152,15 +155,15 @@ class _Reader:
                 if (factor, offset) == _UNCHANGED and source[0] in self.components:
                     outputs.append((end[1], _title(source)))
                     continue
-                value = f"{_title(source)} * {factor:.6g} {offset:+.6g}"
+                value = f"{name_text(_title(source))}{_conversion_text(factor, offset)}"
                 why = "nothing feeds it" if source == end else f"write {value} in formulas"
                 self.notes.append(f"the output {end[1]} of the package is left out: {why}")
             elif kind == "input" and end[0] in self.components and end in self._steps:
                 source, (factor, offset) = self._traced(end)
                 connections[_title(end)] = Connection(_title(source), factor, offset)
                 if (factor, offset) != _UNCHANGED:
-                    shown = f"* {factor:.6g} {offset:+.6g}"
-                    self.notes.append(f"{_title(source)} -> {_title(end)}: {shown}, as the package says")
+                    shown = f"{_title(source)} -> {_title(end)}:{_conversion_text(factor, offset)}"
+                    self.notes.append(f"{shown}, by units and transformations of the package")
                 if source[0] not in self.components:
                     fed = self._passing(source, end, factor, offset)
                     inputs[source] = self._joint(inputs.get(source, fed), fed)
@@ -169,12 +172,12 @@ class _Reader:
     def values(self, inputs: Sequence[Variable], connected: Collection[str]) -> dict[str, float | str]:
         """Return the values of variables; those that name nothing are noted."""
         found: dict[str, float | str] = {}
-        own = {v.name: v for v in inputs}
+        own, fed = {v.name: v for v in inputs}, {_title(end) for end in self._steps}
         for name, given in self._given.items():
             targets = list(self._targets(name))
             if name in own:
                 found[name] = self._value(given, own[name])
-            elif not targets:
+            elif not targets and name not in fed:  # what feeds a connector replaces its value
                 self.notes.append(f"the parameter {name} of the package names nothing that can be set")
             for end, source, (factor, offset) in targets:
                 if _title(end) in connected:
@@ -257,7 +260,8 @@ class _Reader:
         try:
             component = self.components[at] = Component(file, None, _INTERFACES[implementation])
             description = self._descriptions[at] = describe(file, component.sha256)
-            self._units = {**read_structure(file, component.sha256).units, **self._units}
+            self._own_units[at] = read_structure(file, component.sha256).units
+            self._units = {**self._own_units[at], **self._units}
         except ModelError as error:
             raise self._wrong(f"the component {at}: {source}: {error}") from None
         self._declare(element, at, {v.name: v for v in description.info.variables})
@@ -335,11 +339,11 @@ class _Reader:
             raise self._wrong(
                 f"{_title(end)} is fed by the output {_title(at)}, which nothing feeds; connect that one too"
             )
-        factor, offset, unit, before = 1.0, 0.0, self._connectors[at][1], at
+        factor, offset, unit, before, stating = 1.0, 0.0, self._connectors[at][1], at, at
         for target, change in reversed(chain):
             wanted = self._connectors[target][1]
             if not change.suppress:
-                found = conversion(unit, wanted, (self._units, self._units))
+                found = conversion(unit, wanted, (self._units_of(stating), self._units_of(target)))
                 if found is None:
                     raise self._wrong(
                         f"{_title(before)} is in {unit}, {_title(target)} in {wanted}; the package defines "
@@ -348,8 +352,11 @@ class _Reader:
                 factor, offset = found[0] * factor, found[0] * offset + found[1]
             factor = change.factor * factor
             offset = change.factor * offset + change.offset
-            unit, before = wanted or unit, target
+            unit, before, stating = wanted or unit, target, target if wanted else stating
         return at, (factor, offset)
+
+    def _units_of(self, end: End) -> Mapping[str, Unit]:
+        return {**self._units, **self._own_units.get(end[0], {})}
 
     def _joint(self, one: Variable, other: Variable) -> Variable:
         both = zip(one.limits, other.limits, strict=True)
@@ -423,6 +430,12 @@ def _kind(type_name: str) -> str:
 
 def _named(at: str) -> str:
     return f"the element {at}" if at else "the system"
+
+
+def _conversion_text(factor: float, offset: float) -> str:
+    """Return what follows a name, as formulas have it: with digits enough to compute with."""
+    added = f" {'-' if offset < 0 else '+'} {abs(offset):.15g}" if offset else ""
+    return (f" * {factor:.15g}" if factor != 1.0 else "") + added
 
 
 def _title(end: End) -> str:

@@ -5,6 +5,7 @@ use that, and says how to reply. ``published`` has the same for the variants tha
 """
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
@@ -178,7 +179,8 @@ def _context(view: View) -> Iterator[str]:
     yield _CONTEXT
     for excerpt in view.context.excerpts:
         yield f"--- {excerpt.name} ({excerpt.form}) ---"
-        yield excerpt.text
+        # No line of a file may look like the end of the files, behind which instructions follow.
+        yield re.sub(r"^(?=[ \t]*---)", "> ", excerpt.text, flags=re.MULTILINE)
     yield "--- end of the files ---"
     if others := [c.text for c in view.context.comparisons if not c.signals]:
         yield f"Other comparisons with constants in them: {'; '.join(others)}"

@@ -137,16 +137,19 @@ def test_trajectories_conversions_and_the_stop_time_stay(tmp_path: Path) -> None
         assert {"resources/input.csv", "resources/start_values.ssv"} <= set(package.namelist())
 
 
-def test_inputs_and_values_of_the_whole_stay(tmp_path: Path) -> None:
+def test_inputs_outputs_and_values_of_the_whole_stay(tmp_path: Path) -> None:
     ports = """<ssd:Connectors><ssd:Connector name="r" kind="input"><ssc:Real/></ssd:Connector>
+      <ssd:Connector name="way" kind="output"><ssc:Real unit="m"/></ssd:Connector>
       </ssd:Connectors><ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>"""
     ports += f"{values('plant.T Real 4', 'r Real 0.5')}</ssd:ParameterValues></ssd:ParameterBinding>"
     wire = '<ssd:Connection startConnector="r" endElement="pi" endConnector="r"/>'
+    wire += '<ssd:Connection startElement="plant" startConnector="y" endConnector="way"/>'
     ssd = structure(system(PLANT + PI, FEEDBACK + wire, before=f"{ports}</ssd:ParameterBindings>"))
     model = read_package(write(tmp_path / "a.ssp", ssd, "Plant_2", "Gain_2"))
     found = again(model, tmp_path)
     assert [v.name for v in found.info.inputs] == ["r"] and found.frame.values == model.frame.values
     np.testing.assert_array_equal(run(found, "plant.x")["plant.x"], run(model, "plant.x")["plant.x"])
+    assert found.info["way"] == model.info["way"], "requirements may name it"
 
 
 def test_the_package_follows_the_schema_of_the_standard(tmp_path: Path) -> None:

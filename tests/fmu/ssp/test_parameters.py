@@ -78,6 +78,18 @@ def test_a_connection_of_parameters_converts_the_value(tmp_path: Path) -> None:
     assert starts(write(tmp_path / "p.ssp", ssd, "Plant_2")) == {"plant.T": 9.0}
 
 
+def test_the_value_of_a_connector_that_is_fed_is_replaced_without_a_note(tmp_path: Path) -> None:
+    port = '<ssd:Connector name="p" kind="parameter"><ssc:Real/></ssd:Connector>'
+    port = f"<ssd:Connectors>{port}</ssd:Connectors>"
+    wire = '<ssd:Connection startConnector="p" endElement="plant" endConnector="T"/>'
+    inner = system(PLANT, wire, before=port + bindings(inline("p Real 4")), name="body")
+    outer = '<ssd:Connection startConnector="p" endElement="body" endConnector="p"/>'
+    ssd = structure(system(inner, outer, before=port + bindings(inline("p Real 7"))))
+    file = write(tmp_path / "p.ssp", ssd, "Plant_2")
+    assert starts(file) == {"body.plant.T": 7.0}
+    assert not any("names nothing" in note for note in read_package(file).info.notes)
+
+
 def test_texts_and_items_of_enumerations_are_set(tmp_path: Path) -> None:
     table = '<ssd:Component name="t" source="resources/Table_2.fmu"/>'
     echo = '<ssd:Component name="e" source="resources/Echo_2.fmu"/>'

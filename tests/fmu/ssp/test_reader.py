@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from falsifier.core.model import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
 from falsifier.fmu import read_package
 from falsifier.fmu.ssp import reader as ssp
+from falsifier.problem.requirement import parse_requirement
 from tests.fixtures.archives import packed
 from tests.fmu.fixtures import altered, path
 from tests.fmu.packages import FEEDBACK, PI, PLANT, structure, system, values, write
@@ -87,7 +89,9 @@ def test_nested_systems_are_flattened_and_transformations_add_up(tmp_path: Path)
     links = {n.target.name: n for n in model.network.links}
     assert (links["u"].factor, links["u"].offset) == (20.0, 7.0), "2 (10 y + 3) + 1"
     assert (links["measured"].factor, links["measured"].offset) == (1.0, 0.0)
-    assert any("pi.y -> body.plant.u: * 20 +7, as the package says" in note for note in model.info.notes)
+    assert any(
+        "pi.y -> body.plant.u: * 20 + 7, by units and transformations" in note for note in model.info.notes
+    )
 
 
 def test_a_description_in_the_same_package_is_a_component(tmp_path: Path) -> None:
@@ -154,11 +158,33 @@ def test_outputs_of_the_whole_that_are_no_output_of_a_component_are_noted(tmp_pa
       <ssc:LinearTransformation factor="2"/></ssd:Connection>"""
     ssd = structure(system(PLANT, scaled, before=ROOT_PORTS))
     model = read_package(write(tmp_path / "scaled.ssp", ssd, "Plant_2"))
-    said = "the output height of the package is left out: write plant.y * 2 +0 in formulas"
+    said = "the output height of the package is left out: write plant.y * 2 in formulas"
     assert said in model.info.notes and "height" not in model.info
+    with pytest.raises(SpecError, match=r"'height'.* write plant"):
+        parse_requirement("G (height <= 1)", model.info, Experiment(1.0, 0.1, ()))
+    blank = ssd.replace('"plant"', '"big plant"').replace('r="2"', 'r="0.3333333333333333" offset="-1"')
+    (note,) = (
+        n for n in read_package(write(tmp_path / "b.ssp", blank, "Plant_2")).info.notes if "height" in n
+    )
+    value = note.partition("write ")[2].removesuffix(" in formulas")
+    formula = parse_requirement(
+        f"G ({value} <= 1)", read_package(tmp_path / "b.ssp").info, Experiment(1.0, 0.1, ())
+    )
+    assert str(formula) == 'G ("big plant.y"*0.333333333333333 - 1 <= 1)', "what is advised can be written"
     ssd = structure(system(PLANT, before=ROOT_PORTS))
     model = read_package(write(tmp_path / "open.ssp", ssd, "Plant_2"))
     assert "the output height of the package is left out: nothing feeds it" in model.info.notes
+
+
+def test_each_fmu_has_its_own_units_even_if_others_mean_something_else_by_a_name(tmp_path: Path) -> None:
+    gain = altered(path("Gain_2mm"), tmp_path / "g.fmu", lambda x: x.replace(b'r="0.001"', b'r="0.004"'))
+    pis = "".join(PI.replace('"pi"', f'"{n}"').replace('"m"', '"mm"') for n in ("one", "two"))
+    pis = pis.replace("Gain_2.fmu", "Gain_2mm.fmu", 1).replace("Gain_2.fmu", "other.fmu")
+    wires = "".join(FEEDBACK.split("/>", 1)[1].replace('"pi"', f'"{n}"') for n in ("one", "two"))
+    more: dict[str, str | bytes] = {"resources/other.fmu": gain.read_bytes()}
+    file = write(tmp_path / "u.ssp", structure(system(PLANT + pis, wires)), "Plant_2", "Gain_2mm", more=more)
+    factors = [link.factor for link in read_package(file).network.links]
+    assert factors == pytest.approx([1000.0, 250.0])
 
 
 def plant(old: str, new: str) -> str:
