@@ -82,9 +82,11 @@ class PredictedCost:
             held = np.concatenate([inputs[:, :, j], inputs[:, -1:, j]], axis=1)
             columns[r.name] = r.at(held)
         found: Margins = []
-        with np.errstate(all="ignore"):  # what is not finite is cut by ``learnable``
+        with np.errstate(all="ignore"):  # what is infinite is cut by ``learnable``
             for predicate, discrete in zip(self.predicates, self.discrete, strict=True):
                 values = np.broadcast_to(predicate.margin(columns), states.shape[:2])
+                # Undefined, such as the logarithm of a negative number, at times that do not matter.
+                values = np.where(np.isnan(values), 0.0, values)
                 found.append(np.clip(values, -_DISCRETE, _DISCRETE) if discrete else values)
         return found
 
@@ -108,14 +110,16 @@ class PredictedCost:
         """Return the cost with each margin scaled by the standard deviation of its simulated values."""
         scales = []
         for i, discrete in enumerate(self.discrete):
-            spread = float(np.std(np.concatenate([margins[i] for margins in seen])))
+            values = np.concatenate([margins[i] for margins in seen])
+            finite = values[np.isfinite(values)]
+            spread = float(np.std(finite)) if finite.size else 0.0
             scales.append(_DISCRETE if discrete else max(spread, 1e-9))
         return replace(self, scales=tuple(scales))
 
     def _columns(self, margins: Margins) -> dict[str, NDArray[np.float64]]:
         beyond = self._monitor.samples - self.grid.cells - 1
         return {
-            f"p{i}": np.pad(learnable(np.nan_to_num(m)) / s, ((0, 0), (0, beyond)), mode="edge")
+            f"p{i}": np.pad(learnable(m) / s, ((0, 0), (0, beyond)), mode="edge")
             for i, (m, s) in enumerate(zip(margins, self.scales, strict=True))
         }
 

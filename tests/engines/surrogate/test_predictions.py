@@ -46,6 +46,17 @@ def test_predicted_robustness_is_the_monitors_where_grid_and_samples_coincide(te
     assert all(0.0 <= v.critical_time <= CELLS * STEP for v in verdicts)
 
 
+def test_margins_that_are_undefined_or_infinite_where_nothing_looks_leave_a_scale() -> None:
+    space, grid = SearchSpace((), (), CELLS * STEP), TimeGrid(STEP, CELLS, CELLS)
+    formula = parse("log(x) <= 1")  # judged at time 0 only
+    cost = PredictedCost.of(formula, space, grid, ("x",), discrete=frozenset(), constants={})
+    states = np.linspace([2.0, 3.0], [-1.0, 0.0], CELLS + 1).T[..., None]
+    margins = cost.margins(states, np.zeros((2, CELLS, 0)))
+    scaled = cost.rescaled([margins])
+    assert 0.1 < scaled.scales[0] < 10.0, "the spread of what is defined"
+    assert scaled.cost(margins) * scaled.scales == pytest.approx(1.0 - np.log([2.0, 3.0]))
+
+
 @pytest.mark.parametrize("text", ["G[0,10] F[0,0.3] (x > 0)", "G[0.2,19.9] (x > 0)", "F[0,20] X (x > 0)"])
 def test_windows_between_grid_points_are_rounded(text: str) -> None:
     space, grid = SearchSpace((), (), CELLS * STEP), TimeGrid(STEP, CELLS, CELLS)

@@ -56,6 +56,12 @@ def test_finds_a_resonance_that_no_constant_excites() -> None:
     assert all(count is not None for count in counts), counts
 
 
+def test_goes_on_where_a_predicate_is_undefined_at_times_that_do_not_matter() -> None:
+    problem = lag_problem("log(x + 0.1) <= 3", free=FREE)  # judged at time 0 only
+    judged = partial(evaluate, problem)
+    assert len(drive(Surrogate(problem, seed=0), judged, rounds=12)) == 12
+
+
 def test_violates_a_condition_on_two_times_at_once() -> None:
     # High by 2 s although below 0.1 at 1 s, and low again at the end: no extreme does that.
     problem = lag_problem("(F[0,1] (x > 0.1)) or (G[2,4] (x < 0.5)) or (F[6,10] (x > -0.5))", free=FREE)
