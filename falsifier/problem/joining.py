@@ -252,7 +252,8 @@ def _notes(
             what = f"its start value, {readable(start)} {unit}, is outside the range"
         else:
             value = fixed[name]
-            factor, offset = factor_and_offset(shown, unit, defined_units(model)) or (1.0, 0.0)
+            units, is_relative = defined_units(model), variable.is_relative
+            factor, offset = factor_and_offset(shown, unit, units, is_relative=is_relative) or (1.0, 0.0)
             is_strange = abs(factor * value + offset - start) < abs(value - start)
             what = f"{readable(value)} {shown} would be nearer to its start value, {readable(start)} {unit}"
         if is_strange:
