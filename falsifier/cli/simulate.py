@@ -112,15 +112,10 @@ def _without_numbers(source: ProblemSource) -> tuple[ProblemSource, dict[str, fl
 
 
 def _read(file: Path, problem: Problem) -> dict[str, Signal]:
-    """Read the file of inputs; say on stderr what of it is not used."""
+    """Read the file of inputs; say on stderr what of it is not used, or kept after its end."""
     found = read_inputs(file, problem.info)
-    stop_time = problem.experiment.stop_time
-    if found.unused:
-        warn(f"{file}: not inputs of the model, and not used: {', '.join(found.unused)}")
-    if found.end > stop_time:
-        warn(f"{file}: ends at {found.end:.12g} s, the simulation at {stop_time:.12g} s: see --stop-time")
-    if 0.0 < found.end < stop_time:
-        warn(f"{file}: ends at {found.end:.12g} s; the last values are kept until {stop_time:.12g} s")
+    for note in found.notes(problem.experiment.stop_time):
+        warn(f"{file}: {note}")
     return dict(found.signals)
 
 

@@ -1,5 +1,6 @@
 """Evaluation of a candidate: simulate it and monitor the trajectory."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -33,6 +34,7 @@ from falsifier.problem.ranges import string_value
 from falsifier.stl import Formula, Monitor
 from falsifier.stl.monitor import Verdict
 
+_LOG = logging.getLogger(__name__)
 Status = Literal["ok", "failed", "crashed", "timeout"]
 
 
@@ -144,7 +146,10 @@ def simulate(
     driven: Any = {} if inputs is None else inputs
     values = {} if parameters is None else parameters
     if isinstance(driven, str | PathLike):
-        driven = read_inputs(Path(driven), info).signals
+        found = read_inputs(Path(driven), info)
+        for note in found.notes(problem.experiment.stop_time):
+            _LOG.warning("%s: %s", driven, note)
+        driven = found.signals
     if isinstance(driven, Candidate):
         driven, values = driven.signals, {**driven.parameters, **values}
     instance("inputs", driven, Mapping, "numbers or signals by name, a CSV file or a candidate")
