@@ -50,13 +50,15 @@ def join(
     changes: ModelChanges | None = None,
     model: Model | None = None,
     searches: bool = True,
+    is_free: bool = True,
 ) -> Joined:
     """Join a validated spec with its FMU or system.
 
     ``path`` is that of the spec file, for relative paths and error messages. ``stated`` is the requirement of
     an option, to use instead of the spec's with what that one overrides. ``changes`` are stronger than
     everything in the spec. Without a model, it is the one that the spec names. ``searches``: whether to
-    refuse a spec in which everything is fixed.
+    refuse a spec in which everything is fixed. ``is_free``: whether the spec's limits of free control points
+    hold where it also states a number of them.
 
     Raises:
         SpecError: naming the file, the key and the remedy.
@@ -89,6 +91,9 @@ def join(
         for layer in layers:
             inputs |= {name: overlay(inputs.get(name), s) for name, s in layer.inputs.items()}
             parameters |= {name: overlay(parameters.get(name), s) for name, s in layer.parameters.items()}
+        if not is_free:
+            no = {"free": None}
+            inputs = {n: s.model_copy(update=no) if s.control_points else s for n, s in inputs.items()}
         formulas = formulas_of(experiment.stop_time)
         free = default_freedom(formulas, stop_time=experiment.stop_time, step=experiment.output_interval)
         inputs = {name: s.model_copy(update={"free": free}) if s.is_open else s for name, s in inputs.items()}
