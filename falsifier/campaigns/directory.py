@@ -8,7 +8,10 @@
     lock              held while a process works on this campaign
 """
 
+import logging
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from functools import cache
 from pathlib import Path
 
 from pydantic import Field
@@ -17,9 +20,10 @@ from falsifier.campaigns.request import CampaignRequest
 from falsifier.core.literals import shell_word
 from falsifier.errors import JournalError
 from falsifier.record.files import CAMPAIGN, is_locked, locked, make_folder, read_sealed, write_sealed
-from falsifier.record.journal import holds_run
-from falsifier.record.manifest import Surroundings, runs_below
+from falsifier.record.journal import JOURNAL, holds_run
+from falsifier.record.manifest import MANIFEST, Surroundings, runs_below
 
+_LOG = logging.getLogger(__name__)
 _LOCK = "lock"
 # Time in s to wait for the lock: is_worked_on() holds it for a moment.
 _LOCK_PATIENCE = 0.5
@@ -56,23 +60,41 @@ def run_directory(directory: Path, name: str) -> Path:
 def run_directories(directory: Path) -> list[Path]:
     """Directories of all runs that have started, in the campaign's order.
 
-    For a run directory, itself. For a folder that is neither but contains run directories, those.
+    For a run directory, itself. For a folder that is neither but contains run directories, those. A warning
+    tells which ones have lost their manifest.
 
     Raises:
         JournalError: if the directory contains neither a campaign nor a run.
     """
     if is_campaign(directory):
-        named = read_campaign(directory).request.named()
-        return [p for n in named if holds_run(p := run_directory(directory, n))]
+        places = [run_directory(directory, name) for name in read_campaign(directory).request.named()]
+        return _known(places, f"falsifier tools repair {shell_word(directory)} lets the campaign repeat it")
     if holds_run(directory):
         return [directory]
-    if below := runs_below(directory):
+    places = sorted({*runs_below(directory), *runs_below(directory, JOURNAL)})
+    if below := _known(places, "put that file back"):
         return below
     if not directory.exists():
         raise JournalError(f"{directory}: no such directory; expected that of a run or campaign")
     raise JournalError(
         f"{directory}: not a run or campaign directory: it contains neither {CAMPAIGN} nor a run's manifest"
     )
+
+
+def _known(places: Sequence[Path], remedy: str) -> list[Path]:
+    """Return the directories that are runs, and warn of those of which there is only what happened."""
+    found = [place for place in places if holds_run(place)]
+    for journal in (place / JOURNAL for place in places if place not in found):
+        if journal.exists() and journal.stat().st_size:  # made empty before the manifest is written
+            _tell_left_out(journal.parent, remedy)
+    return found
+
+
+@cache
+def _tell_left_out(place: Path, remedy: str) -> None:
+    """Tell it once, however often a command looks."""
+    why = f"it has a journal, but no {MANIFEST}, which says what was searched"
+    _LOG.warning("%s is left out: %s; %s", place, why, remedy)
 
 
 def campaign_lock(directory: Path) -> AbstractContextManager[None]:

@@ -9,6 +9,7 @@ import click
 from falsifier.analyses.lint import LintFinding, lint
 from falsifier.cli import options
 from falsifier.cli.command import command
+from falsifier.cli.files import in_existing_folder
 from falsifier.cli.llm_options import connection_options, llm_option, llm_settings
 from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.files import bundled, write_whole
@@ -133,9 +134,6 @@ def _file(subject: "Subject", out: Path | None) -> Path:
     if out is None and subject.path.parent == bundled("specs"):
         raise SpecError("a bundled spec is not changed: give another file with --out")
     file = out or subject.path
-    home = subject.path.resolve().parent
-    if not subject.is_new and home != file.resolve().parent and home != bundled("specs").resolve():
-        raise SpecError(f"{file}: paths in {subject.path} begin in its folder: write --out there")
     if file.exists() and (subject.is_new or file.resolve() != subject.path.resolve()):
         raise SpecError(f"{file} already exists: choose another --out, or give it as MODEL to add to it")
-    return file
+    return in_existing_folder(file)

@@ -20,7 +20,7 @@ from falsifier.counterexamples.case import recorded_inputs
 from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import Evaluation, simulate as simulate_inputs
 from falsifier.evaluation.input_file import read_inputs
-from falsifier.problem.joining import rights_notes
+from falsifier.problem.joining import rights_notes, unit_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import value_kind
@@ -57,9 +57,11 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         read = _read(place, problem) if place is not None and is_table else {}
         constant = {n: Signal((0.0,), (value,), "constant") for n, value in given.items() if n in inputs}
         signals = {**read, **stored.signals, **constant}
+        held = {n: (value, value) for n, value in given.items() if n in problem.info}
+        for note in unit_notes(problem.model, held):
+            warn(note)
         tried = {n: (min(s.values), max(s.values)) for n, s in signals.items() if n in inputs}
-        tried |= {n: (value, value) for n, value in given.items() if n in problem.info}
-        for name, (low, high) in tried.items():
+        for name, (low, high) in (tried | held).items():
             if excess := problem.info[name].excess(low, high):
                 warn(f"{name}: {f'{low:.12g}' if low == high else f'[{low:.12g}, {high:.12g}]'} {excess}")
         known = {*signals, *stored.parameters, *given}
@@ -112,15 +114,10 @@ def _without_numbers(source: ProblemSource) -> tuple[ProblemSource, dict[str, fl
 
 
 def _read(file: Path, problem: Problem) -> dict[str, Signal]:
-    """Read the file of inputs; say on stderr what of it is not used."""
+    """Read the file of inputs; say on stderr what of it is not used, or kept after its end."""
     found = read_inputs(file, problem.info)
-    stop_time = problem.experiment.stop_time
-    if found.unused:
-        warn(f"{file}: not inputs of the model, and not used: {', '.join(found.unused)}")
-    if found.end > stop_time:
-        warn(f"{file}: ends at {found.end:.12g} s, the simulation at {stop_time:.12g} s: see --stop-time")
-    if 0.0 < found.end < stop_time:
-        warn(f"{file}: ends at {found.end:.12g} s; the last values are kept until {stop_time:.12g} s")
+    for note in found.notes(problem.experiment.stop_time):
+        warn(f"{file}: {note}")
     return dict(found.signals)
 
 

@@ -32,6 +32,7 @@ from falsifier.record.journal import repair as repair_run, simulated
 from falsifier.record.manifest import MANIFEST, Manifest
 from falsifier.record.records import RECORDS
 from falsifier.stl.margins import signed
+from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -44,19 +45,24 @@ def repair(*, directory: Path) -> None:
 
     Says what is wrong, keeps a copy of every file that it changes, and removes damaged parts; falsifier
     resume repeats them. A run of a campaign that cannot be repaired is set aside, and the campaign repeats
-    it.
+    it. One that is in use is left as it is.
+
+    Exit codes: 0 repaired, or nothing is damaged, 2 wrong usage, or runs that are in use were left.
     """
-    findings = _repair_campaign(directory) if is_campaign(directory) else _repair_run(directory)
+    findings, busy = _repair_campaign(directory) if is_campaign(directory) else (_repair_run(directory), [])
     for finding in findings:
         say(finding)
+    for place in busy:
+        warn(f"{place}: left, as another process is writing to this run; once it has ended, repair again")
     held = None if is_campaign(directory) else simulated(directory)
     intact = "the journal contains no simulation" if held == 0 else "nothing is damaged"
-    intact += f"; {counted(held, 'simulation')} recorded" if held else ""
-    say("repaired" if findings else f"{directory}: {intact}")
+    intact += f"; {counted(held, 'simulation')} recorded" if held else " in the other runs" if busy else ""
+    conclude("repaired" if findings else f"{directory}: {intact}", JournalError.exit_code if busy else 0)
 
 
-def _repair_campaign(directory: Path) -> list[str]:
-    findings: list[str] = []
+def _repair_campaign(directory: Path) -> tuple[list[str], list[Path]]:
+    """Return what was found, and the runs that are in use, which are left."""
+    findings, busy = list[str](), list[Path]()
     with campaign_lock(directory):
         for name in read_campaign(directory).request.named():
             place = run_directory(directory, name)
@@ -66,10 +72,11 @@ def _repair_campaign(directory: Path) -> list[str]:
                 findings += _repair_run(place)
             except JournalError as error:
                 if is_worked_on(place):  # by a process that continues this run alone
-                    raise
+                    busy.append(place)
+                    continue
                 why = f"{place / MANIFEST}: {error.__cause__}" if error.__cause__ else error
                 findings.append(f"{why}; kept as {set_aside(place).name}, the campaign repeats it")
-    return findings
+    return findings, busy
 
 
 def _repair_run(directory: Path) -> list[str]:

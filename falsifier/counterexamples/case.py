@@ -220,14 +220,17 @@ def known_inputs(place: Path, problem: Problem) -> Fitted:
         SpecError: if the place is none of these, or the run simulated nothing with success.
         CandidateError: naming the place and what does not fit the search space.
     """
+    notes: list[str] = []
     if place.suffix.lower() == ".csv" and not place.is_dir():
-        found = Candidate(read_inputs(place, problem.info).signals)
+        table = read_inputs(place, problem.info)
+        found, notes = Candidate(table.signals), table.notes(problem.experiment.stop_time)
     else:
         found = recorded_inputs(place, problem.name)
     try:
-        return fit(problem.space, replace(found, origin=KNOWN, rationale=f"from {utf_8(str(place))}"))
+        fitted = fit(problem.space, replace(found, origin=KNOWN, rationale=f"from {utf_8(str(place))}"))
     except CandidateError as error:
         raise CandidateError(f"{place}: {error}") from None
+    return replace(fitted, notes=(*notes, *fitted.notes))
 
 
 def recorded_inputs(place: Path, requirement: str) -> Candidate:

@@ -7,8 +7,8 @@ The first criterion that differs decides:
 3. fewer signals that ever leave rest, and fewer parameters that differ from nominal;
 4. fewer control points; then ``constant`` before ``linear`` before ``pchip``;
 5. rounder numbers: rest and nominal, then a bound of the range, then numbers with few digits;
-6. closer to rest and nominal, as a share of the range; finally the numbers themselves, so that the order is
-   total: two candidates with equal keys give equal simulations.
+6. closer to rest and nominal, as a share of the range on its scale; finally the numbers themselves, so that
+   the order is total: two candidates with equal keys give equal simulations.
 """
 
 from collections.abc import Iterator
@@ -46,6 +46,7 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
     parameters = [(p, candidate.parameters[p.name]) for p in problem.space.parameters]
     numbers = [(r, v) for r, s in signals for v in sorted(set(s.values))] + parameters
     rests = {ranged.name: rest_value(problem, ranged) for ranged in problem.space.ranges}
+    distances = [r.share_of(v) - r.share_of(x) for r, v in numbers if (x := rests[r.name]) is not None]
     return (
         sum(len(set(s.values)) for _, s in signals),
         sum(s.switches for _, s in signals),
@@ -55,7 +56,8 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
         sum(_SIMPLEST_FIRST.index(s.interpolation) for _, s in signals),
         sum(_roughness(r, v, rests[r.name]) for r, v in numbers)
         + sum(digits(t) for r, s in signals if not problem.space.is_fixed(r, s) for t in s.times),
-        sum(abs(v - x) / (r.high - r.low) for r, v in numbers if (x := rests[r.name]) is not None),
+        # Without the digits of rounding, which would tell apart what is equally far on both sides.
+        round(sum(map(abs, distances)), 12),
         tuple((s.times, s.values) for _, s in signals),
         tuple(v for _, v in parameters),
     )

@@ -1,5 +1,6 @@
 """Evaluation of a candidate: simulate it and monitor the trajectory."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -33,6 +34,7 @@ from falsifier.problem.ranges import string_value
 from falsifier.stl import Formula, Monitor
 from falsifier.stl.monitor import Verdict
 
+_LOG = logging.getLogger(__name__)
 Status = Literal["ok", "failed", "crashed", "timeout"]
 
 
@@ -144,7 +146,10 @@ def simulate(
     driven: Any = {} if inputs is None else inputs
     values = {} if parameters is None else parameters
     if isinstance(driven, str | PathLike):
-        driven = read_inputs(Path(driven), info).signals
+        found = read_inputs(Path(driven), info)
+        for note in found.notes(problem.experiment.stop_time):
+            _LOG.warning("%s: %s", driven, note)
+        driven = found.signals
     if isinstance(driven, Candidate):
         driven, values = driven.signals, {**driven.parameters, **values}
     instance("inputs", driven, Mapping, "numbers or signals by name, a CSV file or a candidate")
@@ -235,16 +240,21 @@ def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
     return {name: (min(at[name] for at in found), max(at[name] for at in found)) for name in names}
 
 
-def readable_internals(problems: Sequence[Problem]) -> tuple[str, ...]:
+def readable_internals(problems: Sequence[Problem], seconds: float | None = None) -> tuple[str, ...]:
     """Return the internal variables to record in a search; none if the model cannot be asked for them.
 
-    To see that, the model is initialised in the middle of the search space, and steps as above. The problems
-    differ only in their requirement.
+    To see that, the model is initialised in the middle of the search space, and steps as above, for so many s
+    of wall-clock time at most. The problems differ only in their requirement.
     """
     problem = problems[0]
     space, experiment = problem.space, problem.experiment
     names = tuple(dict.fromkeys(name for p in problems for name in p.internals))
-    brief = replace(experiment, stop_time=_shortest(problem), outputs=(*experiment.outputs, *names))
+    brief = replace(
+        experiment,
+        stop_time=_shortest(problem),
+        outputs=(*experiment.outputs, *names),
+        time_limit=min((s for s in (experiment.time_limit, seconds) if s is not None), default=None),
+    )
     with suppress(CandidateError, ModelError, SimulationError):
         if names:
             candidate = space.decode(space.bounds.mean(axis=1))

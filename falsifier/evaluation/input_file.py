@@ -12,7 +12,7 @@ from pathlib import Path
 from falsifier.core.literals import csv_cell, number_in
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import STEP_RAMP, Signal
-from falsifier.errors import SpecError, did_you_mean, in_section
+from falsifier.errors import SpecError, did_you_mean, in_section, written
 from falsifier.problem.unit_check import spelled
 from falsifier.stl.lexer import UNITS
 
@@ -32,6 +32,16 @@ class InputFile:
     unused: tuple[str, ...]  # columns that are variables of the model, but not inputs
     end: float  # time of the last row in s; after it, inputs keep their last values
 
+    def notes(self, stop_time: float) -> list[str]:
+        """Say what of the file a simulation until a time in s does not use, or has to add to it."""
+        told = [f"not inputs of the model, and not used: {', '.join(self.unused)}"] if self.unused else []
+        if self.end > stop_time:
+            option = written("--stop-time", "stop_time")
+            told += [f"ends at {self.end:.12g} s, the simulation at {stop_time:.12g} s: see {option}"]
+        if 0.0 < self.end < stop_time:
+            told += [f"ends at {self.end:.12g} s; the last values are kept until {stop_time:.12g} s"]
+        return told
+
 
 def read_inputs(path: Path, info: ModelInfo) -> InputFile:
     """Read input signals from a CSV file.
@@ -49,12 +59,16 @@ def read_inputs(path: Path, info: ModelInfo) -> InputFile:
 
 
 def csv_rows(path: Path) -> list[tuple[int, list[str]]]:
-    """Return the rows of a CSV file that are not empty, numbered from 1; SpecError if it is none."""
+    """Return the rows of a CSV file that are not empty, numbered from 1; SpecError if it is none.
+
+    Empty columns at the end, which spreadsheets write where something once stood, are left out.
+    """
     try:
         text = path.read_text(encoding="utf-8-sig")
         mark = found[1] if (found := _SEPARATED.match(text)) else ","
-        lines = enumerate(csv.reader(StringIO(text), delimiter=mark), 1)
-        rows = [(n, row) for n, row in lines if any(c.strip() for c in row)]
+        lines = list(enumerate(csv.reader(StringIO(text), delimiter=mark), 1))
+        width = max((k for _, row in lines for k, c in enumerate(row, 1) if c.strip()), default=0)
+        rows = [(n, row[:width]) for n, row in lines if any(c.strip() for c in row)]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else "expected a CSV file in UTF-8"
         raise SpecError(f"cannot be read: {reason}", file=str(path)) from None
@@ -87,6 +101,8 @@ def _read(rows: Sequence[tuple[int, list[str]]], info: ModelInfo) -> InputFile:
     unit = spelled(found[1].replace("µ", "u")) if (found := _UNIT.search(header[0])) else "s"
     if UNITS.get(unit, 1) != 1:
         raise SpecError(f"the time must be in s, got {header[0]!r}: multiply it by {UNITS[unit]:f}")
+    if unnamed := next((n for n, name in enumerate(header[1:], 2) if not name), None):
+        raise SpecError(f"column {unnamed} has no name: write one into row {rows[0][0]}, or drop the column")
     columns = [_inputs_of(name, info) for name in header[1:]]
     named = [v.name for column in columns for v in column]
     if twice := next((name for name in named if named.count(name) > 1), None):

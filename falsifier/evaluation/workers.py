@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from errno import EMFILE, ENFILE
 from functools import partial
 from multiprocessing import Pipe, get_context, parent_process
 from multiprocessing.connection import wait
@@ -18,7 +19,7 @@ from typing import Any, TypeVar
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
-from falsifier.errors import Reader, SpecError, reader, setting, speak_to
+from falsifier.errors import MachineError, Reader, SpecError, reader, setting, speak_to
 from falsifier.evaluation.evaluate import Evaluation, evaluate_any
 from falsifier.fmu import stop_simulations
 from falsifier.problem.problem import Problem
@@ -166,9 +167,18 @@ def death(error: BrokenExecutor) -> str:
 def _process_pool(jobs: int, ending: _End = None) -> ProcessPoolExecutor:
     _start_silent_tracker()
     level = logging.getLogger(_FMU_LOGGER).level
-    return ProcessPoolExecutor(
-        jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=(level, ending, reader())
-    )
+    told = (level, ending, reader())
+    try:
+        return ProcessPoolExecutor(
+            jobs, mp_context=get_context("spawn"), initializer=_prepare_worker, initargs=told
+        )
+    except OSError as error:
+        if error.errno in (EMFILE, ENFILE) or sys.platform != "linux":
+            raise
+        # Containers and services may have it read-only, and the system's message names nothing.
+        raise MachineError(
+            f"/dev/shm: {error.strerror}; workers need semaphores in it: mount a writable tmpfs there"
+        ) from None
 
 
 def _start_silent_tracker() -> None:

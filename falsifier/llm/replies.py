@@ -193,10 +193,9 @@ def _check_possible(value: float, ranged: Range, label: str) -> None:
 
 
 def _range(ranges: Sequence[Range]) -> dict[str, float]:
-    """The range that holds for all of them, and a rounding more."""
-    low, high = min(r.low for r in ranges), max(r.high for r in ranges)
-    slack = _ROUNDING * (high - low)
-    return {"minimum": low - slack, "maximum": high + slack}
+    """The range that holds for all of them, and a rounding more, as it is accepted."""
+    low, high = min(r.at(-_ROUNDING) for r in ranges), max(r.at(1.0 + _ROUNDING) for r in ranges)
+    return {"minimum": low, "maximum": high}
 
 
 def _interpolations(r: InputRange) -> tuple[str, ...]:

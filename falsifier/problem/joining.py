@@ -50,13 +50,15 @@ def join(
     changes: ModelChanges | None = None,
     model: Model | None = None,
     searches: bool = True,
+    is_free: bool = True,
 ) -> Joined:
     """Join a validated spec with its FMU or system.
 
     ``path`` is that of the spec file, for relative paths and error messages. ``stated`` is the requirement of
     an option, to use instead of the spec's with what that one overrides. ``changes`` are stronger than
     everything in the spec. Without a model, it is the one that the spec names. ``searches``: whether to
-    refuse a spec in which everything is fixed.
+    refuse a spec in which everything is fixed. ``is_free``: whether the spec's limits of free control points
+    hold where it also states a number of them.
 
     Raises:
         SpecError: naming the file, the key and the remedy.
@@ -89,6 +91,9 @@ def join(
         for layer in layers:
             inputs |= {name: overlay(inputs.get(name), s) for name, s in layer.inputs.items()}
             parameters |= {name: overlay(parameters.get(name), s) for name, s in layer.parameters.items()}
+        if not is_free:
+            no = {"free": None}
+            inputs = {n: s.model_copy(update=no) if s.control_points else s for n, s in inputs.items()}
         formulas = formulas_of(experiment.stop_time)
         free = default_freedom(formulas, stop_time=experiment.stop_time, step=experiment.output_interval)
         inputs = {name: s.model_copy(update={"free": free}) if s.is_open else s for name, s in inputs.items()}
@@ -241,24 +246,29 @@ def _notes(
     for r in space.inputs:
         if r.hold is not None and r.hold < (step := experiment.step):
             yield f"{r.name}: hold = {readable(r.hold)} s is shorter than the communication step, {step:g} s"
-    ranges = {r.name: r for r in space.ranges}
-    for name in (*ranges, *fixed):
+    limits = {r.name: (r.low, r.high) for r in space.ranges}
+    yield from unit_notes(model, limits | {name: (value, value) for name, value in fixed.items()})
+    yield from rights_notes(model)
+
+
+def unit_notes(model: Model, limits: Mapping[str, tuple[float, float]]) -> Iterator[str]:
+    """Say which ranges, or values as ranges with equal ends, seem to be in the unit that the FMU displays."""
+    for name, (low, high) in limits.items():
         variable = model.info[name]
         start, unit, shown = variable.start_number, variable.unit, variable.display_unit
         if start is None or not unit or shown in ("", unit):
             continue
-        if name in ranges:
-            is_strange = not ranges[name].low <= start <= ranges[name].high
+        if low < high:
+            is_strange = not low <= start <= high
             what = f"its start value, {readable(start)} {unit}, is outside the range"
         else:
-            value = fixed[name]
-            factor, offset = factor_and_offset(shown, unit, defined_units(model)) or (1.0, 0.0)
-            is_strange = abs(factor * value + offset - start) < abs(value - start)
-            what = f"{readable(value)} {shown} would be nearer to its start value, {readable(start)} {unit}"
+            units, is_relative = defined_units(model), variable.is_relative
+            factor, offset = factor_and_offset(shown, unit, units, is_relative=is_relative) or (1.0, 0.0)
+            is_strange = abs(factor * low + offset - start) < abs(low - start)
+            what = f"{readable(low)} {shown} would be nearer to its start value, {readable(start)} {unit}"
         if is_strange:
             how = f"all numbers are in {unit}, not in {shown}, in which the FMU wants it displayed"
             yield f"{name}: {what}; {how}"
-    yield from rights_notes(model)
 
 
 def rights_notes(model: Model) -> Iterator[str]:

@@ -260,6 +260,7 @@ def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
         stated_name=source.stl_name,
         changes=source.changes,
         searches=searches,
+        is_free=source.parameterization == "free" and source.shortest_piece is None,
     )
     return joined, named_context(source, spec, path)
 

@@ -65,8 +65,10 @@ def spelled(unit: str) -> str:
     return _SPELLINGS.get(lowered, lowered if len(unit) > 2 and is_known(lowered, {}) else unit)
 
 
-def factor_and_offset(source: str, target: str, units: Units) -> tuple[float, float] | None:
-    """Return what converts a value from one unit to another, whichever way they are written.
+def factor_and_offset(
+    source: str, target: str, units: Units, *, is_relative: bool = False
+) -> tuple[float, float] | None:
+    """Return what converts a value or a difference from one unit to another, whichever way they are written.
 
     None if they are of different kinds, or nobody says what they are.
 
@@ -76,7 +78,7 @@ def factor_and_offset(source: str, target: str, units: Units) -> tuple[float, fl
     if spelled(source) == spelled(target):
         return 1.0, 0.0
     a, b = (unit if is_known(unit, units) else spelled(unit) for unit in (source, target))
-    found = conversion(a, b, (units, units)) if a and b else None
+    found = conversion(a, b, (units, units), is_relative=is_relative) if a and b else None
     # Without the digits of rounding, so that equal units have the factor 1.
     return None if found is None else (float(f"{found[0]:.12g}"), float(f"{found[1]:.12g}"))
 

@@ -17,7 +17,7 @@ from falsifier.core.literals import one_line, shortest, toml_key
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import in_unit
 from falsifier.errors import FormulaError, SpecError
-from falsifier.fmu import is_package, read_info, read_package
+from falsifier.fmu import is_package, read_info, read_package, with_paths
 from falsifier.fmu.description.structure import conversion
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.joining import join
@@ -26,6 +26,7 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import DEFAULT_POINTS
 from falsifier.problem.requirement import PLACEHOLDER, parse_requirement
 from falsifier.problem.sections import RequirementSection
+from falsifier.problem.shorthand import named_file
 from falsifier.problem.source import MODEL_FILES
 from falsifier.problem.spec import parse_spec, read_spec
 from falsifier.stl import Formula, parse
@@ -265,14 +266,12 @@ def problem_of_starter(text: str, path: Path, name: str = "", *, searches: bool 
 def with_requirement(subject: Subject, out: Path, formula: str, *, description: str) -> tuple[str, str]:
     """Return the spec's text with one more requirement, and its name; comments are kept.
 
-    The name is the first free one of R1, R2, ... The paths of FMUs become those from the folder of ``out``,
-    to which the text will be written.
+    The name is the first free one of R1, R2, ... Relative paths become those from the folder of ``out``, to
+    which the text will be written.
     """
     document = tomlkit.parse(subject.text)
     if subject.path.parent.resolve() != out.resolve().parent:
-        for section in (document.get("model", {}), *document.get("components", {}).values()):
-            if "fmu" in section:
-                section["fmu"] = seen_from(out, subject.path.parent / str(section["fmu"])).as_posix()
+        _move(document, subject.path.parent, out)
     requirements: Any = document["requirements"]
     if subject.is_started:
         del requirements[_STARTED]
@@ -286,3 +285,29 @@ def with_requirement(subject: Subject, out: Path, formula: str, *, description: 
         text = text.replace("\r\n", "\n").replace("\n", "\r\n")
     parse_spec(tomllib.loads(text), file=str(out))
     return text, name
+
+
+def _move(section: Any, folder: Path, out: Path) -> None:
+    """Let relative paths in a spec, a requirement or a profile begin in the folder of another file."""
+
+    def moved(path: object) -> str:
+        given = Path(str(path))
+        return str(path) if given.is_absolute() else seen_from(out, folder / given).as_posix()
+
+    for each in (section, section.get("model", {}), *section.get("components", {}).values()):
+        if "fmu" in each:
+            each["fmu"] = moved(each["fmu"])
+        if "allow" in each:
+            each["allow"] = list(with_paths(each["allow"], moved))
+    context, parameters = section.get("context", {}), section.get("parameters", {})
+    files = list(context.get("files", ()))
+    for key in ("files", "checked"):
+        if key in context:
+            context[key] = [moved(name) if name in files else name for name in context[key]]
+    for name, stated in parameters.items():
+        place, key = (stated, "value") if isinstance(stated, dict) else (parameters, name)
+        text = place.get(key)
+        if isinstance(text, str) and named_file(text, folder) != text:  # a string that names a file
+            place[key] = moved(text)
+    for each in (*section.get("requirements", {}).values(), *section.get("profiles", {}).values()):
+        _move(each, folder, out)

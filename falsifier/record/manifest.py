@@ -161,9 +161,12 @@ def check_no_folder(directory: Path) -> None:
         raise JournalError(f"{directory} is a folder of runs; give one of them: {first_few(below, _NAMED)}")
 
 
-def runs_below(directory: Path) -> list[Path]:
-    """Return the run directories in a folder, in order; those of a spec's groups are a folder deeper."""
-    found = [path.parent for pattern in ("*", "*/*") for path in directory.glob(f"{pattern}/{MANIFEST}")]
+def runs_below(directory: Path, file: str = MANIFEST) -> list[Path]:
+    """Return the run directories in a folder, in order; those of a spec's groups are a folder deeper.
+
+    They are known by a file that they contain.
+    """
+    found = [path.parent for pattern in ("*", "*/*") for path in directory.glob(f"{pattern}/{file}")]
     return sorted(found)
 
 

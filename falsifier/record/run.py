@@ -283,7 +283,7 @@ def carry_out(
             stack.callback(problem.model.close)
         internals = recorded.internals if recorded else ()
         if recorded is None and engine is None:
-            internals = readable_internals(problems)
+            internals = readable_internals(problems, request.budget.seconds)
         engines = [engine] if engine is not None else make_engines(request, told, chat, internals)
         known = [replace(Candidate.from_json(each), origin=KNOWN) for each in request.start_from]
         steps = Steps(stack.enter_context(local_executor(request.jobs, problems[0].model)), internals)

@@ -163,8 +163,13 @@ class Call(Expression):
         return function(values[0]) if len(values) == 1 else reduce(function, values)
 
 
-# Added to a temperature, with either sign, they convert it: its unit is another one then.
+# Added to a temperature, with either sign, they convert it: its unit is another one then. Beside the names of
+# units of temperature, in lower case, "C" and "F" are often written for them.
 _ZERO_POINTS = frozenset(("273", "273.15", "459.67"))
+_TEMPERATURES = frozenset(("k", "kelvin", "degrk", *(
+    f"{degree}{scale}" for degree in ("", "°", "deg", "deg ", "deg_", "degrees ")
+    for scale in ("c", "f", "celsius", "fahrenheit")
+)))  # fmt: skip
 # Units of plain numbers, which fit any other, and functions whose value has the unit of their operands.
 _PLAIN_UNITS, _KEEPING = ("1", "-"), ("abs", "min", "max")
 
@@ -179,10 +184,11 @@ def unit_of(expression: Expression, units: Mapping[str, str]) -> str:
             return ""
         case Call(function) if function not in _KEEPING:
             return ""
-        case Arithmetic() if _ZERO_POINTS & {str(each).lstrip("-") for each in expression.operands}:
-            return ""
     found = {unit_of(operand, units) for operand in expression.operands} - {""}
-    return found.pop() if len(found) == 1 else ""
+    unit = found.pop() if len(found) == 1 else ""
+    if isinstance(expression, Arithmetic) and unit.lower() in _TEMPERATURES:
+        return "" if _ZERO_POINTS & {str(each).lstrip("-") for each in expression.operands} else unit
+    return unit
 
 
 def embraced(part: Any, binding: int) -> str:

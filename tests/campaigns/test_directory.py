@@ -1,4 +1,5 @@
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 
@@ -37,6 +38,25 @@ def test_a_run_is_its_own_only_one_and_a_folder_has_those_in_it(tmp_path: Path) 
     assert run_directories(tmp_path) == [tmp_path / "a", tmp_path / "b"]
     with pytest.raises(JournalError, match="notes"):
         run_directories(tmp_path / "notes")
+
+
+def test_runs_without_a_manifest_are_left_out_and_told(
+    campaign: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    for name in ("a", "b", "starts"):
+        falsify(impossible(), "uniform", budget=1, directory=tmp_path / name)
+    (tmp_path / "b" / "manifest.json").unlink()
+    (tmp_path / "starts" / "manifest.json").unlink()
+    (tmp_path / "starts" / "journal.jsonl").write_text("")
+    assert [run.directory for _ in range(2) for run in load(tmp_path)] == 2 * [tmp_path / "a"]
+    why = "is left out: it has a journal, but no manifest.json, which says what was searched"
+    assert caplog.messages == [f"{tmp_path / 'b'} {why}; put that file back"]
+    copy = copytree(campaign, tmp_path / "campaign")
+    first, *others = run_directories(copy)
+    (first / "manifest.json").unlink()
+    assert run_directories(copy) == others
+    cure = f"falsifier tools repair {copy} lets the campaign repeat it"
+    assert caplog.messages[1:] == [f"{first} {why}; {cure}"]
 
 
 def test_runs_of_a_spec_that_is_searched_in_groups_are_found_a_folder_deeper(tmp_path: Path) -> None:

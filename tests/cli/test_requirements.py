@@ -70,6 +70,12 @@ def test_a_sentence_becomes_a_requirement_of_the_spec(tmp_path: Path) -> None:
     assert "--choose N" in shown.out
     assert done.code == 0, done.err
     assert "my.toml: requirement R1 written; to search: falsifier run my.toml:R1" in done.out
+    (tmp_path / "other").mkdir()
+    with serving(REPLY) as server:
+        again = [*asked(server, "my.toml"), "--choose", "1", "--out", "other/new.toml"]
+        moved = falsifier(*again, cwd=tmp_path, env=ENV)
+    assert "other/new.toml: requirement R2 written" in moved.out, moved.err
+    assert load_problem(str(tmp_path / "other" / "new.toml:R2")).model.path.is_file()  # type: ignore[attr-defined]
     problem = load_problem(str(tmp_path / "my.toml:R1"))
     assert (str(problem.requirement.formula), problem.requirement.description) == (GOOD["formula"], SENTENCE)
 
@@ -96,9 +102,11 @@ def test_wrong_choices_are_errors(tmp_path: Path) -> None:
     with serving(REPLY) as server:
         bundled = falsifier(*asked(server, "AT1"), "--choose", "1", cwd=tmp_path, env=ENV)
         taken = falsifier(*asked(server, "AT1"), "--out", "my.toml", cwd=tmp_path, env=ENV)
+        nowhere = falsifier(*asked(server, "my.toml"), "--out", "no/my.toml", cwd=tmp_path, env=ENV)
         assert not server.received, "said before anything is paid for"
         second = falsifier(*asked(server, "my.toml"), "--choose", "2", cwd=tmp_path, env=ENV)
-    assert (bundled.code, taken.code, second.code) == (2, 2, 2)
+    assert {bundled.code, taken.code, nowhere.code, second.code} == {2}
+    assert "no/my.toml" in nowhere.err
     assert "--out" in bundled.err
     assert "my.toml already exists: choose another --out" in taken.err
     assert "--choose 2: expected 1 to 1" in second.err

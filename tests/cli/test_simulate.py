@@ -5,7 +5,7 @@ import pytest
 
 from falsifier.core.files import bundled
 from tests.command import falsifier
-from tests.fmu.fixtures import path as fixture
+from tests.fmu.fixtures import altered, path as fixture
 from tests.fmu.packages import PLANT, structure, system, write
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 
@@ -43,6 +43,15 @@ def test_values_beyond_the_models_limits_are_simulated_and_drawn(tmp_path: Path)
     assert "constant 100" in done.out, done.err
     assert "throttle: 100.000001 exceeds the model's limits for 'throttle', [0, 100]" in done.err
     assert (tmp_path / "out" / "trajectory.png").is_file()
+
+
+def test_a_value_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> None:
+    old, new = b'unit="m" start="1.0"', b'unit="K" displayUnit="degC" start="293.15"'
+    ball = altered(fixture("Ball_2"), tmp_path / "ball.fmu", lambda text: text.replace(old, new))
+    said = ["simulate", str(ball), "--stl", "G[0,1] (h <= 500)", "--set"]
+    note = "h: 20 degC would be nearer to its start value, 293.15 K; all numbers are in K"
+    assert note in falsifier(*said, "h=20", cwd=tmp_path).err
+    assert "degC" not in falsifier(*said, "h=300", cwd=tmp_path).err
 
 
 def test_how_long_a_file_lasts_is_told(tmp_path: Path) -> None:

@@ -70,6 +70,10 @@ def test_a_csv_file_is_fitted_and_says_where_it_is_from(tmp_path: Path) -> None:
     fitted = known_inputs(file, lag_problem(points=3))
     assert fitted.candidate.signals["u"].values == pytest.approx((-1, 0, 1))
     assert (fitted.candidate.origin, fitted.candidate.rationale) == ("known", f"from {file}")
+    file.write_text("t,u\n0,-1\n5,0\n")
+    assert (
+        "ends at 5 s; the last values are kept until 10 s" in known_inputs(file, lag_problem(points=3)).notes
+    )
     file.write_text("t,u\n0,-1\n10,3\n")
     with pytest.raises(CandidateError, match=r"u\.csv: input 'u' at t = 10 s: 3 is outside"):
         known_inputs(file, lag_problem(points=3))

@@ -1,7 +1,9 @@
 from dataclasses import replace
 
+import pytest
+
 from falsifier.core.candidate import Candidate
-from falsifier.core.ranges import Freedom, ParameterRange
+from falsifier.core.ranges import Freedom, ParameterRange, Scale
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.simplicity import rest_value, simplicity
 from falsifier.testing import lag_problem
@@ -29,6 +31,14 @@ def test_the_order_of_simplicity() -> None:
     ]
     assert in_order == sorted(in_order)  # type: ignore[type-var]
     assert len(set(map(repr, in_order))) == len(in_order)
+
+
+@pytest.mark.parametrize(("scale", "nearer"), [("linear", 1e-4), ("log", 5e-3)])
+def test_what_is_closer_to_nominal_is_measured_on_the_scale(scale: Scale, nearer: float) -> None:
+    problem = lag_problem(parameters=(ParameterRange("x0", 1e-6, 1.0, nominal=1e-3, scale=scale),))
+    signal = Signal((0.0,), (0.0,), "constant")
+    found = sorted((1e-4, 5e-3), key=lambda x: simplicity(problem, Candidate({"u": signal}, {"x0": x})))
+    assert found[0] == nearer
 
 
 def test_rest_is_the_start_value_within_the_range() -> None:

@@ -218,7 +218,7 @@ def test_what_is_no_signal_is_named(inputs: Any, message: str) -> None:
         simulate(lag_problem(), inputs)
 
 
-def test_files_candidates_and_arrays_are_inputs(tmp_path: Path) -> None:
+def test_files_candidates_and_arrays_are_inputs(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     problem = lag_problem(parameters=[START])
     file = tmp_path / "u.csv"
     file.write_text("time,u\n0,0\n10,1\n")
@@ -234,6 +234,10 @@ def test_files_candidates_and_arrays_are_inputs(tmp_path: Path) -> None:
     *same, other = [evaluation.robustness for evaluation in found]
     assert len(set(same)) == 1 and other not in same
     assert hash(signal) == hash(Signal((0.0, 10.0), (0.0, 1.0), "linear"))
+    assert not caplog.messages
+    file.write_text("time,u\n0,0\n5,1\n")
+    simulate(problem, file)
+    assert caplog.messages == [f"{file}: ends at 5 s; the last values are kept until 10 s"]
 
 
 def test_numbers_as_text_are_no_parameters() -> None:

@@ -84,6 +84,11 @@ def test_the_time_may_have_any_name_that_states_no_other_unit(name: str, tmp_pat
     assert found.end == 2
 
 
+def test_empty_columns_at_the_end_are_left_out(tmp_path: Path) -> None:
+    text = "t;u;;\n0;1;;\n\n2;3; ;\n"
+    assert read_inputs(written(tmp_path, text), INFO).signals["u"].values == (1.0, 3.0)
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -111,6 +116,7 @@ def test_the_time_may_have_any_name_that_states_no_other_unit(name: str, tmp_pat
         ("t,u\n0,\n", "row 2, column u: the cell is empty; expected a number"),
         ("t,w\n0,1\n", "1 numbers, expected 2"),
         ("t,u,u\n0,1,2\n", "u is given by two columns"),
+        ("t;u;;\n0;1;;3\n", "column 3 has no name: write one into row 1, or drop the column"),
         ("t,w,w[1]\n0,1 2,3\n", r"w\[1\] is given by two columns"),
     ],
 )

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
+from errno import EMFILE, EROFS
+from os import strerror
 from pathlib import Path
 from threading import Barrier
 from time import sleep
@@ -14,7 +16,8 @@ from typing import Any
 import pytest
 
 from falsifier.core.function_model import FunctionModel
-from falsifier.errors import SimulationError, SpecError, setting
+from falsifier.errors import MachineError, SimulationError, SpecError, setting
+from falsifier.evaluation import workers
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.evaluation.workers import LastingExecutor, death, local_executor, open_workers, start
 from falsifier.testing import lag_problem
@@ -47,6 +50,20 @@ def test_processes_are_as_quiet_as_their_parent_and_end_in_the_middle_of_a_task(
             hanging.result()
     finally:
         logger.setLevel(before)
+
+
+def test_a_machine_without_shared_memory_is_told_what_is_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> None:
+        raise OSError(reason, strerror(reason))
+
+    monkeypatch.setattr(workers, "ProcessPoolExecutor", refuse)
+    monkeypatch.setattr(sys, "platform", "linux")
+    reason = EROFS
+    with pytest.raises(MachineError, match=r"^/dev/shm: Read-only file system; .*: mount a writable tmpfs"):
+        open_workers(1).__enter__()
+    reason = EMFILE
+    with pytest.raises(OSError, match="Too many open files"):
+        open_workers(1).__enter__()
 
 
 def test_an_fmu_is_simulated_in_a_process_per_thread() -> None:

@@ -181,10 +181,16 @@ def test_a_damaged_run_costs_itself_and_not_its_campaign(
         with monkeypatch.context() as there, pytest.raises(JournalError, match="falsifier tools repair"):
             there.chdir(path.parent)
             load_runs(".")
-        for lock in (campaign_lock(tmp_path / "c"), run_lock(path.parent)):
-            with lock:  # what another process writes to stays where it is
-                busy = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path / "c")])
-            assert isinstance(busy.exception, JournalError) and path.exists()
+        with campaign_lock(tmp_path / "c"):
+            busy = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path / "c")])
+        assert isinstance(busy.exception, JournalError)
+        other = tmp_path / "c" / "runs" / runs[-1].name / "journal.jsonl"
+        other.write_bytes(flip(other.read_bytes(), random))
+        with run_lock(path.parent):  # what another process writes to stays where it is
+            busy = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path / "c")])
+        assert f"{path.parent}: left, as another process is writing to this run" in busy.stderr
+        assert busy.exit_code == 2 and path.exists()
+        assert f"{other}: line" in busy.stdout and busy.stdout.endswith("\nrepaired\n")
         done = CliRunner().invoke(cli, ["tools", "repair", str(tmp_path / "c")])
         assert done.exit_code == 0, done.output
         resume_campaign(tmp_path / "c")

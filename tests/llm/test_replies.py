@@ -303,6 +303,9 @@ def test_a_value_beyond_its_range_by_a_rounding_is_clamped() -> None:
     assert clamped.parameters["leak"] == 1e-6
     with pytest.raises(RejectedReplyError, match="outside its range"):  # a rounding of the width of all
         decades.read('{"point": [0]}', origin="me")
+    parameter = decades.schema()["properties"]["parameters"]["items"]["properties"]["value"]
+    leak = decades.space.parameters[0]
+    assert parameter == {"type": "number", "minimum": leak.at(-1e-3), "maximum": leak.at(1.001)}
 
 
 ROWS = re.findall(

@@ -187,10 +187,13 @@ def test_a_range_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> N
 def test_a_value_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> None:
     old, new = b'unit="m" start="1.0"', b'unit="K" displayUnit="degC" start="293.15"'
     ball = altered(fixture("Ball_2"), tmp_path / "ball.fmu", lambda text: text.replace(old, new))
+    differences = altered(
+        ball, tmp_path / "d.fmu", lambda x: x.replace(new, new + b' relativeQuantity="true"')
+    )
     note = "h: 20 degC would be nearer to its start value, 293.15 K; all numbers are in K, not in degC"
-    for value, told in ((300, []), (350, []), (20, [note])):
+    for value, fmu, told in ((300, ball, []), (350, ball, []), (20, ball, [note]), (20, differences, [])):
         changes = changes_from(parameters={"h": value})
-        found = join_formula(ball, RequirementSection(formula="G (h <= 9)"), changes=changes, searches=False)
+        found = join_formula(fmu, RequirementSection(formula="G (h <= 9)"), changes=changes, searches=False)
         assert [n.partition(", in which")[0] for n in found.notes if "degC" in n] == told
 
 

@@ -35,6 +35,17 @@ def test_a_shortest_piece_replaces_the_limits_of_the_spec() -> None:
         load_problem("AT1", shortest_piece=1e-9)
 
 
+def test_control_points_need_not_be_within_limits_that_are_not_used(folder: Path) -> None:
+    limits = "control_points = 7\nfree = { max_control_points = 5, min_interval = 1.0 }"
+    path = spec(folder, GOOD.replace("control_points = 7", limits))
+    with pytest.raises(SpecError, match="7 control points are more than free allows"):
+        load_problem(path)
+    (throttle,) = load_problem(path, parameterization="fixed").space.inputs
+    assert (throttle.control_points, throttle.free) == (7, None)
+    (throttle,) = load_problem(path, shortest_piece=2.0).space.inputs
+    assert (throttle.control_points, throttle.free) == (7, Freedom(25, 2.0))
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

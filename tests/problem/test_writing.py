@@ -139,6 +139,38 @@ def test_in_another_folder_the_fmu_is_found(folder: Path) -> None:
     assert load_problem(f"{out}:R1").name == "R1"
 
 
+def test_in_another_folder_all_files_are_found(tmp_path: Path) -> None:
+    (tmp_path / "a" / "data").mkdir(parents=True)
+    shutil.copy(fmu_path("Table_2"), tmp_path / "a" / "t.fmu")
+    for name in ("table.txt", "control.c", "data/other.txt"):
+        (tmp_path / "a" / name).write_text("1.5")
+    path, out = tmp_path / "a" / "t.toml", tmp_path / "b" / "t.toml"
+    path.write_text(f"""
+        model = {{ fmu = "t.fmu", allow = ["programs", "read:data"] }}
+        context = {{ files = ["control.c", "{tmp_path}/a/data"], checked = ["control.c", "t.fmu: x.c"] }}
+        inputs.u.range = [0, 1]
+        parameters.fileName = "table.txt"
+        [requirements.R]
+        formula = "G (y <= 9)"
+        parameters.fileName.value = "data/other.txt"
+        [profiles.p]
+        allow = ["write:data"]
+        requirements.R.parameters.fileName = "none.txt"
+        """)
+    out.parent.mkdir()
+    out.write_text(with_requirement(subject_of(str(path)), out, "G (y <= 8)", description="table.txt")[0])
+    found = tomllib.loads(out.read_text())
+    assert found["model"] == {"fmu": "../a/t.fmu", "allow": ["programs", "read:../a/data"]}
+    checked = ["../a/control.c", "t.fmu: x.c"]
+    assert found["context"] == {"files": ["../a/control.c", f"{tmp_path}/a/data"], "checked": checked}
+    assert found["parameters"] == {"fileName": "../a/table.txt"}
+    assert found["requirements"]["R"]["parameters"]["fileName"]["value"] == "../a/data/other.txt"
+    requirements = {"R": {"parameters": {"fileName": "none.txt"}}}
+    assert found["profiles"]["p"] == {"allow": ["write:../a/data"], "requirements": requirements}
+    ((_, text),) = load_problem(f"{out}:R1").experiment.strings
+    assert Path(text).samefile(tmp_path / "a" / "table.txt")
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere all names are text")
 def test_from_another_folder_one_that_is_not_of_utf_8_cannot_be_named(
     folder: Path, monkeypatch: pytest.MonkeyPatch

@@ -12,10 +12,12 @@ import pytest
 from numpy import int64
 
 from falsifier.core.files import bundled
+from falsifier.core.model import Experiment
+from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.store import changes_since, load_counterexample
 from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
-from falsifier.errors import JournalError, SpecError
+from falsifier.errors import JournalError, SimulationError, SpecError
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
@@ -30,6 +32,7 @@ from falsifier.search.request import LLMSettings
 from falsifier.testing import lag, lag_problem
 from tests.problems import broken, easy, easy_again, hard, impossible, stepped
 from tests.searches import Wrapped
+from tests.stepped import EulerModel
 
 EASY = "python:tests.problems:easy"
 
@@ -243,7 +246,7 @@ def test_engines_see_internal_variables_and_a_resumed_run_those_that_it_had(
     falsify(problems, budget=4, seed=3, directory=tmp_path / "a")
     described = manifest.read(tmp_path / "a")
     assert described.internals[-1] == described.modes[-1].name == "car4.mode"
-    monkeypatch.setattr("falsifier.record.run.readable_internals", lambda problems: ())
+    monkeypatch.setattr("falsifier.record.run.readable_internals", lambda *_: ())
     continued = resume(tmp_path / "a", budget=20)
     for result in (*whole, *continued):
         assert result.best is not None and result.best.trajectory is not None
@@ -253,6 +256,25 @@ def test_engines_see_internal_variables_and_a_resumed_run_those_that_it_had(
     unseen = falsify(problems, budget=20, seed=3)
     tried = [[e.candidate.key for e in results[0].evaluations] for results in (whole, continued, unseen)]
     assert tried[0] == tried[1] != tried[2]
+
+
+def test_asking_for_internal_variables_takes_no_longer_than_the_search_may(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    limits: list[float | None] = []
+
+    def hang(model: EulerModel, signals: object, parameters: object, experiment: Experiment) -> Trajectory:
+        limits.append(experiment.time_limit)
+        raise SimulationError("hung", status="timeout")
+
+    problem = stepped(lag_problem())
+    problem = replace(problem, model=EulerModel(problem.info))
+    monkeypatch.setattr(EulerModel, "simulate", hang)
+    for own in (None, 5.0):
+        asked = replace(problem, experiment=replace(problem.experiment, internals=("v",), time_limit=own))
+        falsify(asked, "uniform", budget=Budget(simulations=1, seconds=20.0))
+        falsify(asked, "uniform", budget=1)
+    assert limits[::2] == [20.0, None, 5.0, 5.0]
 
 
 def test_engines_made_in_python_and_those_of_other_requirements_see_no_internal_variables(

@@ -79,6 +79,8 @@ def test_the_unit_of_an_expression_is_that_of_its_signals() -> None:
     # In degC, or in K if it was in degC: not in the unit of T.
     for converted in (Arithmetic("-", T, Number(273.15)), Arithmetic("+", Number(-273.15), T)):
         assert unit_of(Call("abs", (converted,)), units) == ""
+    assert unit_of(Arithmetic("-", T, Number(273.15)), {"T": "°C"}) == ""
+    assert unit_of(Arithmetic("+", X, Number(273.0)), units) == "m", "no temperature"
 
 
 @pytest.mark.parametrize(

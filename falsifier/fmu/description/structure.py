@@ -47,14 +47,18 @@ def read_units(root: Element, *, tag: str = "UnitDefinitions/Unit") -> dict[str,
     return found
 
 
-def conversion(source: str, target: str, known: tuple[Units, Units]) -> tuple[float, float] | None:
+def conversion(
+    source: str, target: str, known: tuple[Units, Units], *, is_relative: bool = False
+) -> tuple[float, float] | None:
     """Return factor and offset that convert a value from one unit to another; None if nobody defines them.
 
     A unit that is not stated converts to any other unchanged. ``known`` are the units that the FMU of the
-    source defines, and that of the target.
+    source defines, and that of the target. Offsets do not move differences (``is_relative``).
 
     >>> conversion("km/h", "m/s", ({}, {}))
     (0.2777777777777778, 0.0)
+    >>> conversion("degC", "K", ({}, {})), conversion("degC", "K", ({}, {}), is_relative=True)
+    ((1.0, 273.15), (1.0, 0.0))
     """
     if source == target or not source or not target:
         return 1.0, 0.0
@@ -62,7 +66,7 @@ def conversion(source: str, target: str, known: tuple[Units, Units]) -> tuple[fl
     b = _look_up(target, (known[1], known[0], _COMMON))
     if a is None or b is None or a.exponents != b.exponents or not b.factor:
         return None
-    return a.factor / b.factor, (a.offset - b.offset) / b.factor
+    return a.factor / b.factor, 0.0 if is_relative else (a.offset - b.offset) / b.factor
 
 
 def is_known(name: str, units: Units) -> bool:

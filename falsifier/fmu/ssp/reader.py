@@ -340,10 +340,14 @@ class _Reader:
                 f"{_title(end)} is fed by the output {_title(at)}, which nothing feeds; connect that one too"
             )
         factor, offset, unit, before, stating = 1.0, 0.0, self._connectors[at][1], at, at
+        # Connectors do not say so; the variables at both ends do.
+        of_fmus = [self._descriptions[e].info[name] for e, name in (at, end) if e in self.components]
+        is_relative = any(variable.is_relative for variable in of_fmus)
         for target, change in reversed(chain):
             wanted = self._connectors[target][1]
             if not change.suppress:
-                found = conversion(unit, wanted, (self._units_of(stating), self._units_of(target)))
+                known = self._units_of(stating), self._units_of(target)
+                found = conversion(unit, wanted, known, is_relative=is_relative)
                 if found is None:
                     raise self._wrong(
                         f"{_title(before)} is in {unit}, {_title(target)} in {wanted}; the package defines "
@@ -408,7 +412,8 @@ class _Reader:
         if variable.kind == "string":
             raise self._wrong(f"{value:g} is a number, but {variable.name!r} is a text")
         if not change.suppress:
-            found = conversion(given.unit, variable.unit, (self._units, self._units))
+            known, is_relative = (self._units, self._units), variable.is_relative
+            found = conversion(given.unit, variable.unit, known, is_relative=is_relative)
             if found is None:
                 raise self._wrong(
                     f"the parameter {given.name} is in {given.unit}, {variable.name!r} in {variable.unit}, "

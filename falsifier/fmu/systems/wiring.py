@@ -186,14 +186,12 @@ class _Joiner:
         a, b = output.unit, fed.unit
         units = self._structures[target.member].units
         known = (units if source.member == SYSTEM else self._structures[source.member].units, units)
-        found = conversion(a, b, known)
+        found = conversion(a, b, known, is_relative=output.is_relative or fed.is_relative)
         if found is None:
             raise SpecError(
                 f"the output is in {a}, the input in {b}, and neither FMU defines how to convert "
                 "one to the other; connect like units, or state factor and offset of this connection"
             )
-        if output.is_relative or fed.is_relative:
-            found = found[0], 0.0
         if found != (1.0, 0.0):
             shown = f" {found[1]:+.6g}" if found[1] else ""
             return *found, f"converted from {a} to {b}: * {found[0]:.6g}{shown}"

@@ -11,7 +11,7 @@ from falsifier.analyses.coverage import Coverage, OutputCoverage, PairCoverage, 
 from falsifier.core.ranges import number_names
 from falsifier.core.words import counted, with_unit
 from falsifier.counterexamples.robustness_map import RobustnessMap
-from falsifier.views.plotting.axes import Colour, caption, fit_labels, new_figure, whole_ticks
+from falsifier.views.plotting.axes import Colour, caption, fit_labels, new_figure, set_scale, whole_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +70,8 @@ def _plot_parameter(ax: "Axes", r: RangeCoverage) -> None:
             ax.bar(low, count, width=high - low, align="edge", color=_TRIED, edgecolor="white")
         else:
             ax.axvspan(low, high, color=_NEVER, linewidth=0)
-    ax.set(xlabel=_label(r), ylabel="simulations", xlim=(ends[0], ends[-1]), xscale=r.searched.scale)
+    ax.set(xlabel=_label(r), ylabel="simulations", xlim=(ends[0], ends[-1]))
+    set_scale(ax, x=r.searched.scale)
     _whole(ax.xaxis, r)
     ax.yaxis.set_major_locator(MaxNLocator(integer=True))
 
@@ -79,7 +80,7 @@ def _plot_pair(ax: "Axes", p: PairCoverage, by_name: dict[str, RangeCoverage]) -
     first, second = by_name[p.first], by_name[p.second]
     _heat(ax, _ends(first), _ends(second), p.tried.T.astype(np.intp))
     ax.set(xlabel=_label(first), ylabel=_label(second))
-    ax.set(xscale=first.searched.scale, yscale=second.searched.scale)
+    set_scale(ax, x=first.searched.scale, y=second.searched.scale)
     ax.set_title(f"{p.count} of {p.tried.size} combinations", fontsize=9)
     _whole(ax.xaxis, first)
     _whole(ax.yaxis, second)
@@ -145,7 +146,8 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
         right.plot(found.grid[0], found.surface[0], color=Colour.OUTPUT, linewidth=1.2)
         right.plot(coordinate.value, found.original, "o", color=colour)
         right.axhline(0, color=Colour.QUIET, linewidth=0.8, linestyle="--")
-        right.set(xlabel=caption(coordinate.label), ylabel="robustness", xscale=coordinate.scale)
+        right.set(xlabel=caption(coordinate.label), ylabel="robustness")
+        set_scale(right, x=coordinate.scale)
     fit_labels(right)
     figure.suptitle(f"{caption(title)}: robustness around the {centre}".removeprefix(": "))
     return figure
@@ -167,6 +169,7 @@ def _plot_map(ax: "Axes", found: RobustnessMap) -> None:
     elif low < high:  # one colour: lines show which way it changes
         ax.clabel(ax.contour(*found.grid, found.surface, levels=4, colors="black", linewidths=0.5))
     ax.plot(first.value, second.value, "o", color="black", markersize=5)
-    ax.set(xlabel=caption(first.label), ylabel=caption(second.label), xscale=first.scale, yscale=second.scale)
+    ax.set(xlabel=caption(first.label), ylabel=caption(second.label))
+    set_scale(ax, x=first.scale, y=second.scale)
     ticks = [ends[0], ends[0] / 2, 0.0, ends[1] / 2, ends[1]]  # on both halves, whose scales differ
     ax.figure.colorbar(mesh, ax=ax, label="robustness (red: violated)", ticks=ticks, format="%.3g")

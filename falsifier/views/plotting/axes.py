@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from falsifier.core.files import write_whole
 from falsifier.core.literals import one_line
+from falsifier.core.ranges import Scale
 from falsifier.core.words import shortened
 
 if TYPE_CHECKING:
@@ -55,6 +56,24 @@ def whole_ticks(axis: "Axis", labels: Mapping[int, str]) -> None:
         axis.set_ticks(sorted(labels), labels=names)
     else:
         axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+
+
+def set_scale(ax: "Axes", *, x: Scale = "linear", y: Scale = "linear") -> None:
+    """Scale axes on which everything is drawn already.
+
+    Over less than two decades, matplotlib labels all multiples of a power of ten, one over the other. There,
+    few plain numbers are shown.
+    """
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+
+    ax.set(xscale=x, yscale=y)
+    for axis, scale in ((ax.xaxis, x), (ax.yaxis, y)):
+        low, high = axis.get_view_interval()
+        if scale == "log" and high < 100 * low:
+            subs = (1, 3) if high > 15 * low else (1, 2, 5)
+            axis.set_major_locator(LogLocator(subs=subs) if high > 5 * low else MaxNLocator(3))
+            axis.set_major_formatter("{x:g}")
+            axis.set_minor_formatter(NullFormatter())
 
 
 def fit_labels(ax: "Axes") -> None:

@@ -153,6 +153,29 @@ def test_limits_of_what_is_converted_are_round(tmp_path: Path) -> None:
     assert read_package(file).info["r"].high == 2.000000000000004, "unchanged"
 
 
+@pytest.mark.parametrize(("more", "offset"), [("", 273.15), (' relativeQuantity="true"', 0.0)])
+def test_offsets_do_not_move_differences(more: str, offset: float, tmp_path: Path) -> None:
+    celsius = PLANT.replace('unit="m"', 'unit="degC"')
+    wire = '<ssd:Connection startElement="plant" startConnector="y" endElement="pi" endConnector="measured"/>'
+    out = wire.replace('endElement="pi" ', "")
+    port = OUT.replace('"out"', '"measured"').replace("ssc:Real", 'ssc:Real unit="K"')
+    start = BOUND.format(values("plant.x Real 300 K"))
+    pi = PI.replace("Gain_2", "Gain_2kelvin").replace('unit="m"', 'unit="K"')
+    ssd = structure(system(celsius + pi, wire + out, before=port + start))
+    fmu = altered(
+        path("Plant_2"),
+        tmp_path / "p.fmu",
+        lambda xml: xml.replace(b'unit="m"', f'unit="degC"{more}'.encode()),
+        ending=".xml",
+    )
+    file = write(tmp_path / "d.ssp", ssd, "Gain_2kelvin", more={"resources/Plant_2.fmu": fmu.read_bytes()})
+    found = read_package(file)
+    assert [(n.factor, n.offset) for n in found.network.links] == [(1.0, offset)]
+    assert dict(found.frame.values) == {"plant.x": 300.0 - offset}
+    # An output that is converted would not be the component's own.
+    assert ("measured" in found.info) == (offset == 0.0)
+
+
 def test_outputs_of_the_whole_that_are_no_output_of_a_component_are_noted(tmp_path: Path) -> None:
     scaled = """<ssd:Connection startElement="plant" startConnector="y" endConnector="height">
       <ssc:LinearTransformation factor="2"/></ssd:Connection>"""

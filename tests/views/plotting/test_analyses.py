@@ -1,3 +1,4 @@
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +47,20 @@ def test_axes_of_ranges_in_decades_are_logarithmic() -> None:
     scales = [(ax.get_xscale(), ax.get_yscale()) for ax in figure.axes[:3]]
     assert scales == [("log", "linear"), ("log", "linear"), ("log", "log")]
     assert png(figure, dpi=50)
+
+
+@pytest.mark.parametrize("high", [1.2, 4.9, 8.0, 20.0, 60.0, 99.0, 300.0])
+def test_numbers_beside_an_axis_in_decades_do_not_overlap(high: float) -> None:
+    p, q = (Range(name=name, low=2e-3, high=2e-3 * high, scale="log") for name in "pq")
+    candidate = Candidate({}, {"p": 2e-3, "q": 2e-3})
+    figure = plot_coverage(coverage_of(described(parameters=(p, q)), [(candidate, None)]))
+    figure.draw_without_rendering()
+    for ax in figure.axes[:3]:
+        labels = [*ax.get_xticklabels(), *ax.get_xticklabels(minor=True)]
+        boxes = [label.get_window_extent() for label in labels if label.get_text()]
+        left, right = ax.get_window_extent().intervalx
+        ends = sorted((box.x0, box.x1) for box in boxes if left <= (box.x0 + box.x1) / 2 <= right)
+        assert len(ends) > 1 and all(a[1] < b[0] for a, b in pairwise(ends)), ends
 
 
 def test_red_is_what_was_never_tried() -> None:
