@@ -9,7 +9,6 @@ import numpy as np
 from falsifier.engines.box import BoxEngine, Proposal
 from falsifier.engines.layout import Array
 from falsifier.engines.optimisers.conditions import Conditions
-from falsifier.engines.optimisers.trust_region import TrustRegion
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
 
@@ -17,8 +16,12 @@ from falsifier.problem.problem import Problem
 _FIRST_SIDE, _LONGEST, _SHORTEST = 0.8, 1.6, 0.02
 # Successes in a row after which the side doubles.
 _SUCCESSES = 3
-# Points of the process, those nearest to the best one.
-_MOST_POINTS = 80
+# Points of the process, those nearest to the best one; candidates from which the next point is chosen.
+_MOST_POINTS, _CANDIDATES = 80, 1000
+# Mean number of coordinates in which a candidate differs from the best point: all at once seldom helps.
+_CHANGED = 8.0
+# Of the changed coordinates, the share that is at a bound.
+_AT_BOUND = 0.1
 # Variance of the observation noise, relative to that of a condition; distance in standard deviations from the
 # mean at which a condition is cut: what is far off would hide the differences among the rest.
 _NOISE, _FARTHEST = 1e-4, 5.0
@@ -60,11 +63,10 @@ class Bayesian(BoxEngine):
         return np.asarray(values / np.where(spread > 0.0, spread, 1.0))
 
     def _step(self, points: Array, scores: Array, rng: np.random.Generator) -> Array:
-        # Here, because they load scipy, which many short searches do without.
-        from scipy.spatial.distance import cdist
-
+        # Here, because it loads scipy, which many short searches do without.
         from falsifier.engines.optimisers.gaussian_process import fit_lengths
 
+        d = self.box.dimension
         best = points[int(np.argmin(self._conditions.lowest(scores, scores)))]
         near = np.argsort(np.abs(points - best).max(axis=1), kind="stable")[:_MOST_POINTS]
         points, scores = points[near], scores[:, near]
@@ -74,18 +76,22 @@ class Bayesian(BoxEngine):
         # Coordinates on which little depends get a longer side.
         logs = np.mean([np.log(process.lengths) for process in processes], axis=0)
         half = 0.5 * self._side * np.clip(np.exp(logs - logs.mean()), 0.25, 4.0)
-        region = TrustRegion(best, np.clip(best - half, 0.0, 1.0), np.clip(best + half, 0.0, 1.0))
-
-        def judge(candidates: Array, optimism: Array) -> Array:
-            """Return the robustness if conditions deviate so far, in standard deviations, to the better."""
-            predicted = [process.predict(candidates) for process in processes]
-            means, deviations = (np.array(rows) for rows in zip(*predicted, strict=True))
-            bounds = (centre + spread * (means + side * optimism * deviations) for side in (-1.0, 1.0))
-            is_known = cdist(candidates, points, "chebyshev").min(axis=1) <= 1e-6
-            return np.where(is_known, np.inf, self._conditions.lowest(*bounds))
-
-        found = region.lowest(judge, self.box.settled, rng)
-        return rng.random(self.box.dimension) if found is None else found
+        low, high = np.clip(best - half, 0.0, 1.0), np.clip(best + half, 0.0, 1.0)
+        moved = rng.random((_CANDIDATES, d)) < min(1.0, _CHANGED / d)
+        moved[np.arange(_CANDIDATES), rng.integers(0, d, _CANDIDATES)] = True
+        levels = low + (high - low) * rng.random((_CANDIDATES, d))
+        levels = np.where(
+            rng.random((_CANDIDATES, d)) < _AT_BOUND, np.where(levels > best, high, low), levels
+        )
+        candidates = self.box.settled(np.where(moved, levels, best))
+        candidates = candidates[np.abs(candidates[:, None] - points).max(axis=2).min(axis=1) > 1e-6]
+        if not len(candidates):
+            return rng.random(d)
+        predicted = [process.predict(candidates) for process in processes]
+        means, deviations = (np.array(rows) for rows in zip(*predicted, strict=True))
+        margin = np.abs(rng.standard_normal(len(candidates))) * deviations
+        bounds = (centre + spread * (means + side) for side in (-margin, margin))
+        return np.asarray(candidates[np.argmin(self._conditions.lowest(*bounds))])
 
     def _learn(self, point: Array, evaluation: Evaluation) -> None:
         values, improved = self._conditions.values(evaluation), False

@@ -67,7 +67,7 @@ _PRIORS_OF_PARAMETERS = _PRIORS | {"region": 0.8, "dynamics": 0.3}
 # Reserved shares where levels lead: going on from what reached the lowest one, or from what is rare.
 _WHERE_LEVELS_LEAD = {"levels": 0.55, "coverage": 0.2}
 # The same where there are only parameters, which the region searches best.
-_OF_PARAMETERS = {"region": 0.8}
+_OF_PARAMETERS = {"region": 0.7}
 # The arms with a share of turns that no rating takes away.
 _SIMPLE = ("coverage", "uniform", "corners", "cma")
 # Of these, those that do not go on from what was reached: something new that they reach is chance, no merit.
