@@ -63,7 +63,9 @@ class Bayesian(BoxEngine):
         return np.asarray(values / np.where(spread > 0.0, spread, 1.0))
 
     def _step(self, points: Array, scores: Array, rng: np.random.Generator) -> Array:
-        # Here, because it loads scipy, which many short searches do without.
+        # Here, because they load scipy, which many short searches do without.
+        from scipy.spatial.distance import cdist
+
         from falsifier.engines.optimisers.gaussian_process import fit_lengths
 
         d = self.box.dimension
@@ -84,7 +86,7 @@ class Bayesian(BoxEngine):
             rng.random((_CANDIDATES, d)) < _AT_BOUND, np.where(levels > best, high, low), levels
         )
         candidates = self.box.settled(np.where(moved, levels, best))
-        candidates = candidates[np.abs(candidates[:, None] - points).max(axis=2).min(axis=1) > 1e-6]
+        candidates = candidates[cdist(candidates, points, "chebyshev").min(axis=1) > 1e-6]
         if not len(candidates):
             return rng.random(d)
         predicted = [process.predict(candidates) for process in processes]
