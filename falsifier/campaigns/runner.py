@@ -20,7 +20,7 @@ from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import SpecError, written
 from falsifier.evaluation.workers import open_workers
 from falsifier.llm.model_file import is_model_file, served
-from falsifier.problem.loading import load_source
+from falsifier.problem.loading import load_source, note_named
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
@@ -65,6 +65,8 @@ def run_campaign(
     problems = check_request(request)
     with campaign_lock(directory):
         check_new(directory)
+        for source in problems:
+            note_named(source)
         record = CampaignRecord(**manifest.environment(), request=request, hashes=_hashes(problems))
         write_campaign(directory, record)
         return _work(directory, record, problems, jobs, listeners)

@@ -20,7 +20,7 @@ from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.evaluate import readable_internals
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
-from falsifier.problem.loading import load_source, reloadable
+from falsifier.problem.loading import load_source, note_named, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
@@ -139,6 +139,8 @@ def falsify(
     name = engine if made is None else made.name
     settings = _settings(llm)
     base = None if directory is None else path_of("directory", directory)
+    for source in [each.source for each in problems if base is not None and each.source is not None]:
+        note_named(source)
     if base is not None and len(groups) > 1:
         check_unused(base)
     results: dict[str, Result] = {}
