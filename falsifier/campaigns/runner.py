@@ -28,7 +28,7 @@ from falsifier.record.journal import STOP, check_new, holds_run, open_journal
 from falsifier.record.records import EndedRecord
 from falsifier.record.summary import RunFollower, Summary
 from falsifier.search.budget import Budget
-from falsifier.search.make_engines import check_names, check_price, told_problems
+from falsifier.search.make_engines import check_llm, check_names, check_price, note_llm, told_problems
 from falsifier.search.request import RunRequest
 
 Listener = Callable[[Progress], None]
@@ -67,6 +67,8 @@ def run_campaign(
         check_new(directory)
         for source in problems:
             note_named(source)
+        for run in request.runs:
+            note_llm(run.llm)
         record = CampaignRecord(**manifest.environment(), request=request, hashes=_hashes(problems))
         write_campaign(directory, record)
         return _work(directory, record, problems, jobs, listeners)
@@ -93,6 +95,8 @@ def resume_campaign(
     instance("limits", limits, (Budget, type(None)), "a Budget")
     with campaign_lock(directory):
         record = read_campaign(directory)
+        for run in record.request.runs:
+            check_llm(directory, run.llm)
         sources = (run.problems[0] for run in record.request.runs)
         with manifest.loading(directory, sources, record.hashes):
             problems = _load(record.request.runs)

@@ -31,7 +31,7 @@ from falsifier.record.replay import replayed
 from falsifier.search.budget import Budget, budget_of
 from falsifier.search.events import Evaluated, Event, Listener
 from falsifier.search.loop import search
-from falsifier.search.make_engines import make_engines, told_problems
+from falsifier.search.make_engines import check_llm, make_engines, note_llm, told_problems
 from falsifier.search.parameterization import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
@@ -141,6 +141,7 @@ def falsify(
     base = None if directory is None else path_of("directory", directory)
     for source in [each.source for each in problems if base is not None and each.source is not None]:
         note_named(source)
+    note_llm(settings if chat is None else None)
     if base is not None and len(groups) > 1:
         check_unused(base)
     results: dict[str, Result] = {}
@@ -203,6 +204,7 @@ def resume(
             raise JournalError(f"{place}: its engine was made in Python: call resume() with engine=...")
         if engine is not None and engine.name != described.engine:
             raise JournalError(f"{place}: this run has the engine {described.engine!r}, not {engine.name!r}")
+        check_llm(place, request.llm if chat is None else None)
         if not problems and not request.problems:
             raise JournalError(f"{place}: its problem was made in Python: call resume() with problems=[...]")
         if not problems:
