@@ -349,7 +349,7 @@ def repair(directory: Path) -> list[str]:
                 f"there on dropped, kept as {copy.name}; to resume the run repeats what is missing"
             )
         for path in sorted((directory / files.TRAJECTORIES).glob("*.npz")):
-            if not files.is_intact(path, path.read_bytes()):
+            if not (files.is_own_file(path) and files.is_intact(path, path.read_bytes())):
                 kept = files.set_aside(path).name
                 found.append(f"{path}: damaged; kept as {kept}, simulated again if needed")
     return found

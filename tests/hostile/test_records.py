@@ -1,24 +1,33 @@
 """Records that somebody else wrote: what they name is not yet named by whoever continues or replays them."""
 
 import json
+import os
+import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from falsifier.campaigns import CampaignRequest, cross, resume_campaign
 from falsifier.campaigns.directory import CampaignRecord, write_campaign
+from falsifier.core.files import checksum, seal
 from falsifier.counterexamples.case import counterexample_case
 from falsifier.counterexamples.store import FILE_NAME, save, to_store
 from falsifier.errors import ChatSetupError, JournalError
 from falsifier.problem.loading import load_problem
 from falsifier.problem.source import ProblemSource
+from falsifier.record.journal import repair
 from falsifier.record.manifest import environment
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.make_engines import note_llm
 from falsifier.search.request import LLMSettings
+from falsifier.testing import lag_problem
+from falsifier.views.report import html_report
 from tests.llm.server import serving
 from tests.record.support import write_manifest
 
@@ -114,3 +123,72 @@ def test_the_providers_own_server_and_that_of_the_environment_need_no_naming(
     assert recorded.is_usual
     assert not LLMSettings(name=name, api_base="http://127.0.0.1:8").is_usual
     assert not LLMSettings(name="/models/any.gguf").is_usual
+
+
+def archive(save: Callable[..., None] = np.savez, **parts: Any) -> bytes:
+    """What numpy writes, of a trajectory of x with some other parts."""
+    buffer = BytesIO()
+    times, columns = np.linspace(0.0, 10.0, 11), np.zeros((1, 11))
+    names = {"names": np.array(["x"]), "units": np.array([""])}
+    save(buffer, **{"times": times, "columns": columns, **names, **parts})
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"no archive",
+        b"PK\3\4 and nothing else",
+        archive(names=np.array(["x", "y"])),
+        archive(columns=np.zeros((1, 5))),
+        archive(times=np.array([object()])),
+        archive(np.savez_compressed, columns=np.zeros((1, 1000)), times=np.arange(1000.0)),
+    ],
+    ids=["text", "cut off", "too few", "too short", "pickle", "compressed"],
+)
+def test_a_trajectory_of_any_content_is_one_that_was_not_kept(content: bytes, tmp_path: Path) -> None:
+    written(tmp_path, f"trajectories/0-{checksum(content)}.npz")
+    (tmp_path / f"trajectories/0-{checksum(content)}.npz").write_bytes(content)
+    assert "is damaged or missing" in html_report(tmp_path)
+    assert not resume(tmp_path, problems=[lag_problem(name="EASY")])[0].falsified
+
+
+def test_a_trajectory_without_the_signals_of_the_requirement_is_not_drawn(tmp_path: Path) -> None:
+    content = archive(names=np.array(["y"]))
+    written(tmp_path, f"trajectories/0-{checksum(content)}.npz")
+    (tmp_path / f"trajectories/0-{checksum(content)}.npz").write_bytes(content)
+    assert "is damaged or missing" in html_report(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["/dev/zero", "../x.npz", "trajectories/../0-0.npz", "manifest.json"])
+def test_a_record_names_no_trajectory_elsewhere(name: str, tmp_path: Path) -> None:
+    written(tmp_path, name)
+    with pytest.raises(JournalError, match="line 2 is damaged: String should match pattern"):
+        html_report(tmp_path)
+
+
+def test_a_trajectory_that_is_a_link_or_a_pipe_is_not_read(tmp_path: Path) -> None:
+    for name, make in (
+        ("trajectories/0-0.npz", lambda path: path.symlink_to("/dev/zero")),
+        ("trajectories/0-1.npz", os.mkfifo),
+    ):
+        written(tmp_path, name)
+        make(tmp_path / name)
+        assert "is damaged or missing" in html_report(tmp_path)
+        assert len(repair(tmp_path)) == 1
+
+
+def written(place: Path, trajectory: str) -> None:
+    """Write a run of one simulation whose record names another trajectory."""
+    shutil.rmtree(place / "trajectories", ignore_errors=True)
+    (place / "journal.jsonl").unlink(missing_ok=True)
+    (place / "manifest.json").unlink(missing_ok=True)
+    falsify(lag_problem(name="EASY"), "uniform", budget=1, directory=place)
+    for kept in (place / "trajectories").iterdir():
+        kept.unlink()
+    lines = [json.loads(line) for line in (place / "journal.jsonl").read_text().splitlines()]
+    for line in lines:
+        del line["sum"]
+        if line["kind"] == "evaluated":
+            line["trajectory"] = trajectory
+    (place / "journal.jsonl").write_text("".join(seal(json.dumps(line)) for line in lines))
