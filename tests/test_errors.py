@@ -53,7 +53,7 @@ def test_an_option_is_to_blame_in_place_of_the_spec_that_it_changes(place: str |
 # What reads and writes options; options of other programs; what is written for the command line.
 _OF_OPTIONS = (
     *("problem/shorthand.py", "llm/failures.py", "llm/providers.py", "campaigns/archcomp.py"),
-    "counterexamples/export/components.py",
+    *("counterexamples/export/components.py", "search/request.py"),
 )
 
 

@@ -20,7 +20,7 @@ from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import SpecError, written
 from falsifier.evaluation.workers import open_workers
 from falsifier.llm.model_file import is_model_file, served
-from falsifier.problem.loading import load_source
+from falsifier.problem.loading import load_source, note_named
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
@@ -28,7 +28,7 @@ from falsifier.record.journal import STOP, check_new, holds_run, open_journal
 from falsifier.record.records import EndedRecord
 from falsifier.record.summary import RunFollower, Summary
 from falsifier.search.budget import Budget
-from falsifier.search.make_engines import check_names, check_price, told_problems
+from falsifier.search.make_engines import check_llm, check_names, check_price, note_llm, told_problems
 from falsifier.search.request import RunRequest
 
 Listener = Callable[[Progress], None]
@@ -65,6 +65,10 @@ def run_campaign(
     problems = check_request(request)
     with campaign_lock(directory):
         check_new(directory)
+        for source in problems:
+            note_named(source)
+        for run in request.runs:
+            note_llm(run.llm)
         record = CampaignRecord(**manifest.environment(), request=request, hashes=_hashes(problems))
         write_campaign(directory, record)
         return _work(directory, record, problems, jobs, listeners)
@@ -91,6 +95,8 @@ def resume_campaign(
     instance("limits", limits, (Budget, type(None)), "a Budget")
     with campaign_lock(directory):
         record = read_campaign(directory)
+        for run in record.request.runs:
+            check_llm(directory, run.llm)
         sources = (run.problems[0] for run in record.request.runs)
         with manifest.loading(directory, sources, record.hashes):
             problems = _load(record.request.runs)

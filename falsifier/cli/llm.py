@@ -169,10 +169,11 @@ def check(*, name: str, **options: Any) -> None:
     """
     from falsifier.llm.check import check_chat
     from falsifier.llm.providers import key_variable
-    from falsifier.search.make_engines import open_chat, price_of
+    from falsifier.search.make_engines import note_llm, open_chat, price_of
 
     settings = llm_options.llm_settings({"llm": name, **options})
     assert settings is not None
+    note_llm(settings)
     alone = {"cache": False, "timeout": settings.timeout or _CHECK_TIMEOUT}
     features, usage = check_chat(open_chat(settings.model_copy(update=alone), attempts=_CHECK_ATTEMPTS))
     price = price_of(settings) or "unknown"

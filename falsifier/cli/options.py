@@ -204,6 +204,7 @@ def problem_source(options: dict[str, Any]) -> "ProblemSource":
     Raises:
         click.UsageError: if a profile is chosen from an FMU.
     """
+    from falsifier.problem.loading import note_named
     from falsifier.problem.source import ProblemSource
 
     chosen = options.pop("parameterization")
@@ -216,6 +217,7 @@ def problem_source(options: dict[str, Any]) -> "ProblemSource":
         changes=changes_in(options),
         context=options.pop("context", ()),
     )
+    note_named(source)
     if chosen.profile is not None and source.parts.kind == "fmu":
         raise click.UsageError(
             f"--parameterization {chosen.profile}: only specs have profiles; expected free or fixed"

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 from typing import IO
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,12 +117,16 @@ class Trajectory:
 
     @classmethod
     def load(cls, place: Path | IO[bytes]) -> "Trajectory":
-        """Read a trajectory that ``save`` wrote."""
-        with np.load(place, allow_pickle=False) as archive:
-            names = [str(n) for n in archive["names"]]
-            columns = archive["columns"]
-            units = {n: str(u) for n, u in zip(names, archive["units"], strict=True) if str(u)}
-            return cls(archive["times"], {n: columns[i] for i, n in enumerate(names)}, units)
+        """Read a trajectory that ``save`` wrote; MonitorError if it is none."""
+        try:
+            with np.load(place, allow_pickle=False) as archive:
+                if any(entry.compress_type for entry in archive.zip.infolist()):  # it may grow without limit
+                    raise ValueError("it is compressed")
+                names, units = ([str(each) for each in archive[key]] for key in ("names", "units"))
+                columns = dict(zip(names, archive["columns"], strict=True))
+                return cls(archive["times"], columns, {n: u for n, u in zip(names, units, strict=True) if u})
+        except (AttributeError, LookupError, TypeError, ValueError, EOFError, BadZipFile) as error:
+            raise MonitorError(f"no recorded trajectory: {error}") from None
 
 
 def is_discrete(column: NDArray[np.float64], *, kind: str) -> bool:

@@ -78,6 +78,7 @@ class Case:
             )
         remedy = "put it there, or correct problem.target in this file and delete its last key, sum"
         manifest.check_in_sight(self.place, [self.source], remedy)
+        manifest.check_named(self.place, [self.source])
         problem = load_source(self.source)
         model = problem.model
         if not isinstance(model, FmuModel | System):

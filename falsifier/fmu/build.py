@@ -4,7 +4,7 @@ import importlib.util
 import re
 import tempfile
 import zipfile
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
 from falsifier.core.compiler import compile_c
@@ -53,6 +53,8 @@ def _compile(path: Path, folder: Path, major: int, identifier: str, target: Path
         files = [str(file) for file in found if (root / file).resolve() not in included]
     if not files:
         raise ModelError(f"{path}: contains no C sources; export it with sources or for this platform")
+    if stray := [file for file in files if PurePosixPath(file).is_absolute() or ".." in file.split("/")]:
+        raise ModelError(f"{path}: the source files {', '.join(stray)} are outside sources/; export it again")
     missing = [file for file in files if not (root / file).is_file()]
     if missing:
         raise ModelError(f"{path}: the source files {', '.join(missing)} are missing; export it again")
@@ -72,7 +74,8 @@ def _compile(path: Path, folder: Path, major: int, identifier: str, target: Path
         [
             *("-O2", "-w", "-shared", "-fPIC"), *(f"-I{name}" for name in dict.fromkeys(folders)),
             f"-I{_headers()}", *(f"-D{name}={value}" if value else f"-D{name}" for name, value in macros),
-            *header, *files, "-lm", "-o", str(target),
+            # Names begin with a folder: compilers take those with a dash or an at sign for options.
+            *header, *(f"./{name}" for name in files), "-lm", "-o", str(target),
         ],
     )  # fmt: skip
 

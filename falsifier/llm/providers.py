@@ -85,6 +85,8 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
 
 # Sent if an OpenAI-compatible server needs no key, because its client insists on one.
 NO_KEY = "none"
+# Options of litellm that take the place of the address or of the provider in the name.
+_OF_SERVERS = frozenset({"base_url", "api_base", "custom_llm_provider"})
 _ADDRESS_FORM = "http://HOST:PORT/v1 or https://..."
 
 
@@ -128,9 +130,14 @@ def _is_address(text: str) -> bool:
 
 
 def check_option_values(options: Mapping[str, Any]) -> None:
-    """Refuse numbers no request can contain, and limits of tokens that are none; ChatSetupError."""
+    """Refuse other servers, numbers no request can contain, impossible limits of tokens; ChatSetupError."""
     for name, value in options.items():
         option = written(f"--llm-option {name}", name)
+        if name in _OF_SERVERS:  # prompts and the key would go to another one than is told
+            raise ChatSetupError(
+                f"{option}: state the address of a server as {setting('api_base')}, and the provider as the "
+                "first part of the name"
+            )
         if isinstance(value, float) and not isfinite(value):
             raise ChatSetupError(f"{option}: expected a finite number, got {value}")
         if name in ("max_tokens", "max_completion_tokens") and (type(value) is not int or value < 1):

@@ -7,13 +7,16 @@
 
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from importlib import import_module
+from importlib.util import find_spec as find_module
 from os import PathLike
 from pathlib import Path
 from traceback import extract_tb
 
 from falsifier.context.values import Named
+from falsifier.core import named
 from falsifier.core.arguments import texts
 from falsifier.core.files import bundled
 from falsifier.core.literals import one_line, shell_word
@@ -139,6 +142,7 @@ def load_problem(
         changes=changes,
         context=texts("context", context),
     )
+    note_named(source)
     return load_source(source)
 
 
@@ -200,6 +204,26 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
         problem = replace(problem, space=problem.space.fixed)
     _LOADED[source] = problem.fingerprint
     return problem
+
+
+def note_named(source: ProblemSource) -> None:
+    """Note that the user has named the module of a problem made in Python, which a record may name later."""
+    if source.parts.kind == "python":
+        named.note(_module(source))
+
+
+def is_named(source: ProblemSource) -> bool:
+    """Whether loading a source imports no module, or one that the user has named on this machine."""
+    return source.parts.kind != "python" or named.is_noted(_module(source))
+
+
+def _module(source: ProblemSource) -> str:
+    """The target of a problem made in Python, and where it would be imported from; imports nothing."""
+    found = None
+    with suppress(ImportError, ValueError, AttributeError):
+        found = find_module(source.target.split(":")[1].partition(".")[0])
+    places = [] if found is None else [found.origin or "", *(found.submodule_search_locations or ())]
+    return "\n".join([source.target, *(str(Path(place).resolve()) for place in places)])
 
 
 def reloadable(problem: Problem) -> ProblemSource | None:

@@ -11,6 +11,7 @@ from functools import cache
 from io import BytesIO
 from itertools import count
 from pathlib import Path
+from stat import S_ISREG
 from time import monotonic, sleep
 from typing import TypeVar
 
@@ -20,7 +21,7 @@ from falsifier.core.files import check_seal, checksum, seal, write_whole
 from falsifier.core.literals import one_line, shell_word
 from falsifier.core.posix_files import lock_file
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import JournalError, first_fault, written
+from falsifier.errors import JournalError, MonitorError, first_fault, written
 
 _LOG = logging.getLogger(__name__)
 
@@ -112,16 +113,21 @@ def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
         return None
     path = directory / name
     try:
+        if not is_own_file(path):
+            raise OSError("it is no file of the run")
         content = path.read_bytes()
     except OSError as error:
         # Where only the best one is kept, it is the only file, and later than those that it has replaced.
         left = [_index(p) for p in path.parent.glob("*.npz") if re.fullmatch(TRAJECTORY_NAMES, p.name)]
         if not (isinstance(error, FileNotFoundError) and len(left) == 1 and left[0] > _index(path)):
-            _tell_lost(path, error.strerror or "it cannot be read")
+            _tell_lost(path, error.strerror or str(error))
         return None
-    if is_intact(path, content):
-        return Trajectory.load(BytesIO(content))
-    _tell_lost(path, "its checksum does not match")
+    try:
+        if is_intact(path, content):
+            return Trajectory.load(BytesIO(content))
+        _tell_lost(path, "its checksum does not match")
+    except MonitorError as error:  # which somebody has written on purpose
+        _tell_lost(path, str(error))
     return None
 
 
@@ -133,6 +139,11 @@ def _index(trajectory: Path) -> int:
 def _tell_lost(path: Path, why: str) -> None:
     """Tell it once, however often a command reads the file."""
     _LOG.warning("%s is damaged: %s. It is left out, or simulated again where it is needed.", path, why)
+
+
+def is_own_file(path: Path) -> bool:
+    """Whether a path is a file and no link, device or pipe, which may lead anywhere or never end."""
+    return S_ISREG(path.lstat().st_mode)
 
 
 def is_intact(path: Path, content: bytes) -> bool:

@@ -26,7 +26,7 @@ from time import monotonic
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, remove_partial
-from falsifier.core.literals import shell_word
+from falsifier.core.literals import one_line, shell_word
 from falsifier.core.words import counted
 from falsifier.errors import JournalError, written
 from falsifier.evaluation.evaluate import Evaluation
@@ -188,7 +188,17 @@ def open_journal(directory: Path, *, keep: Keep = "history", patience: float = 0
 
 
 def run_lock(directory: Path, patience: float = 0.0) -> AbstractContextManager[None]:
-    """Hold the lock of a run directory; JournalError if another process writes to it for so many s."""
+    """Hold the lock of a run directory, in which files can then be changed.
+
+    Raises:
+        JournalError: if another process writes to it for so many s, or what would be changed is elsewhere.
+    """
+    for path in (directory / JOURNAL, directory / files.TRAJECTORIES):
+        if path.is_symlink():  # whoever made the directory would choose what is changed and deleted
+            raise JournalError(
+                f"{path} is a link, and a run's files are written and deleted in its own directory only: "
+                f"put what it leads to, {one_line(str(path.readlink()))}, in its place"
+            )
     busy = f"{directory}: another process is writing to this run; wait until it ends"
     return files.locked(directory / LOCK, busy=busy, patience=patience)
 
@@ -339,7 +349,7 @@ def repair(directory: Path) -> list[str]:
                 f"there on dropped, kept as {copy.name}; to resume the run repeats what is missing"
             )
         for path in sorted((directory / files.TRAJECTORIES).glob("*.npz")):
-            if not files.is_intact(path, path.read_bytes()):
+            if not (files.is_own_file(path) and files.is_intact(path, path.read_bytes())):
                 kept = files.set_aside(path).name
                 found.append(f"{path}: damaged; kept as {kept}, simulated again if needed")
     return found

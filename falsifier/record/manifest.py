@@ -15,13 +15,14 @@ from pydantic import ConfigDict, Field
 
 from falsifier import __version__
 from falsifier.context.values import Context
+from falsifier.core.literals import shell_word
 from falsifier.core.model import Variable
 from falsifier.core.ranges import Range, ValueKind
 from falsifier.core.strict import Strict
 from falsifier.core.words import first_few
-from falsifier.errors import FalsifierError, JournalError, did_you_mean, setting
+from falsifier.errors import FalsifierError, JournalError, did_you_mean, setting, written
 from falsifier.fmu import fmu_files, fmus_sha256, is_packaged
-from falsifier.problem.loading import source_file
+from falsifier.problem.loading import is_named, source_file
 from falsifier.problem.problem import Held, Problem
 from falsifier.problem.source import Parameterization, ProblemSource
 from falsifier.record.files import read_sealed, write_sealed
@@ -177,6 +178,16 @@ def check_in_sight(place: Path, sources: Iterable[ProblemSource], remedy: str = 
             raise JournalError(f"{place}: made with {file}, which is not seen from this folder: {remedy}")
 
 
+def check_named(place: Path, sources: Iterable[ProblemSource]) -> None:
+    """Refuse to import what only a record names, which may be somebody else's; JournalError telling so."""
+    for target in (source.target for source in sources if not is_named(source)):
+        naming = written(f"python -m falsifier check {shell_word(target)}", f"load_problem({target!r})")
+        raise JournalError(
+            f"{place}: made with {target}, a module that would be run, and nobody has named it on this "
+            f"machine; if you know what it does, name it first: {naming}"
+        )
+
+
 def write(directory: Path, manifest: Manifest) -> None:
     """Write the manifest of a run directory."""
     write_sealed(directory / MANIFEST, manifest)
@@ -259,7 +270,9 @@ def loading(
 
     Only then: of a project that was copied, the recorded hashes are of files that are no longer used.
     """
+    sources = list(sources)
     check_in_sight(directory, sources)
+    check_named(directory, sources)
     try:
         yield
     except FalsifierError:

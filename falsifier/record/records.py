@@ -11,6 +11,7 @@ from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Evaluation, Status
 from falsifier.llm.messages import Exchange
 from falsifier.problem.problem import Problem
+from falsifier.record.files import TRAJECTORIES, TRAJECTORY_NAMES
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
 from falsifier.search.result import ResultStatus
@@ -53,7 +54,11 @@ class EvaluatedRecord(_Record):
     reason: str = ""
     seconds: float
     log: list[str] = Field([])
-    trajectory: str | None = Field(None, description="File, relative to the run directory.")
+    trajectory: str | None = Field(
+        None,
+        pattern=rf"^{TRAJECTORIES}/{TRAJECTORY_NAMES}$",
+        description="File, relative to the run directory.",
+    )
     elapsed: float = _ELAPSED
 
     def evaluation(self, candidate: Candidate, requirement: str) -> Evaluation:

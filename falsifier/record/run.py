@@ -20,7 +20,7 @@ from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.evaluate import readable_internals
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
-from falsifier.problem.loading import load_source, reloadable
+from falsifier.problem.loading import load_source, note_named, reloadable
 from falsifier.problem.problem import Problem, alike, check_names
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
@@ -31,7 +31,7 @@ from falsifier.record.replay import replayed
 from falsifier.search.budget import Budget, budget_of
 from falsifier.search.events import Evaluated, Event, Listener
 from falsifier.search.loop import search
-from falsifier.search.make_engines import make_engines, told_problems
+from falsifier.search.make_engines import check_llm, make_engines, note_llm, told_problems
 from falsifier.search.parameterization import engine_parameterization
 from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.search.result import Result
@@ -139,6 +139,9 @@ def falsify(
     name = engine if made is None else made.name
     settings = _settings(llm)
     base = None if directory is None else path_of("directory", directory)
+    for source in [each.source for each in problems if base is not None and each.source is not None]:
+        note_named(source)
+    note_llm(settings if chat is None else None)
     if base is not None and len(groups) > 1:
         check_unused(base)
     results: dict[str, Result] = {}
@@ -201,6 +204,7 @@ def resume(
             raise JournalError(f"{place}: its engine was made in Python: call resume() with engine=...")
         if engine is not None and engine.name != described.engine:
             raise JournalError(f"{place}: this run has the engine {described.engine!r}, not {engine.name!r}")
+        check_llm(place, request.llm if chat is None else None)
         if not problems and not request.problems:
             raise JournalError(f"{place}: its problem was made in Python: call resume() with problems=[...]")
         if not problems:

@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 from falsifier.context.values import Context
+from falsifier.core import named
 from falsifier.core.files import cache_directory
 from falsifier.engines import DEFAULT_ENGINE, ENGINES, check_engine, make_engine
 from falsifier.engines.protocol import Engine
-from falsifier.errors import SpecError, setting
+from falsifier.errors import ChatSetupError, SpecError, setting
 from falsifier.llm.messages import Chat
 from falsifier.llm.model_file import is_model_file
 from falsifier.llm.providers import check_recorded
@@ -129,6 +131,25 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
     )
     check_price(llm, max_cost)
     return chat
+
+
+def note_llm(llm: LLMSettings | None) -> None:
+    """Note that the user has named this language model with its server, which a record may name later."""
+    if llm is not None and not llm.is_usual:
+        named.note(llm.check)
+
+
+def check_llm(place: Path, llm: LLMSettings | None) -> None:
+    """Refuse to ask a server that only a record names, which may be somebody else's.
+
+    Raises:
+        ChatSetupError: naming it and what to do.
+    """
+    if not (llm is None or llm.is_usual or named.is_noted(llm.check)):
+        raise ChatSetupError(
+            f"{place}: prompts, and a key of yours if the provider needs one, would go to {llm.told}, which "
+            f"nobody has named on this machine; if they may, name it first: {llm.check}"
+        )
 
 
 def check_price(llm: LLMSettings, max_cost: float | None) -> None:

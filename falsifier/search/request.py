@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
+from falsifier.core.literals import shell_word
 from falsifier.core.secrets import holds_credentials, is_secret_option, without_credentials
 from falsifier.core.strict import Strict
 from falsifier.llm import Effort
@@ -49,6 +50,22 @@ class LLMSettings(Strict):
     def told(self) -> str:
         """Its name, and where its server is, if that is not the provider's own."""
         return f"{self.name} at {self.api_base}" if self.api_base else self.name
+
+    @property
+    def check(self) -> str:
+        """The command that checks it, with all that decides where prompts and a key go."""
+        given = [] if self.api_base is None else [f"--api-base {shell_word(self.api_base)}"]
+        options = sorted(self.options.items())
+        # Numbers name no place.
+        given += [f"--llm-option {shell_word(f'{n}={v}')}" for n, v in options if isinstance(v, bool | str)]
+        return " ".join(["falsifier llm check", shell_word(self.name), *given])
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether prompts go to the provider's own server, or the environment's, and nowhere else."""
+        here = LLMSettings(name=self.name)
+        usual = (here.check, here.model_copy(update={"api_base": None}).check)
+        return self.check in usual and not is_model_file(self.name)
 
     @model_validator(mode="before")
     @classmethod

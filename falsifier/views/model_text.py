@@ -7,6 +7,7 @@ from dataclasses import fields
 from typing import Any
 
 from falsifier.context.simulink import Diagram, structure_text
+from falsifier.core.literals import one_line
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.words import aligned, counted, readable
 
@@ -54,7 +55,7 @@ def info_text(info: ModelInfo, *, everything: bool = False) -> str:
             lines += [title, *aligned(rows, right=_RIGHT_ALIGNED, widest=_WIDEST_COLUMN)]
         if len(variables) > limit:
             lines.append(f"... and {len(variables) - limit} more; --all shows all {title}")
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))  # so that no name makes a line of its own
 
 
 def model_json(info: ModelInfo) -> dict[str, Any]:

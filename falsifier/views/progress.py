@@ -146,7 +146,11 @@ class News:
                 replayed = f", {known} from the journal" if event.replayed else ""
                 formulas = (f"{problem.name}: {problem.requirement.formula}" for problem in event.problems)
                 sent = f", prompts go to {event.server}" if event.server else ""
-                return [*formulas, f"engine {event.engines[0]}{sent}{replayed}", *_choices(event)]
+                context = [problem.named_context for problem in event.problems]
+                files = [*(name for each in context for name in each.files)]
+                files += ["files inside the FMU"] * any(each.fmu for each in context)
+                read = f", context: {', '.join(dict.fromkeys(files))}" if files else ""  # a spec may name it
+                return [*formulas, f"engine {event.engines[0]}{sent}{read}{replayed}", *_choices(event)]
             case events.Evaluated(evaluation=ended, spent=spent):
                 told = []
                 if ended.status != "ok" and self._is_new(f"failed: {cause_of(ended.reason)}"):

@@ -12,7 +12,7 @@ from falsifier.llm.usage import Price
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import environment
 from falsifier.search.budget import Budget
-from falsifier.search.make_engines import price_of
+from falsifier.search.make_engines import note_llm, price_of
 from falsifier.search.request import LLMSettings
 
 PAID = LLMSettings(name="openai/m")
@@ -76,5 +76,6 @@ def test_a_resumed_campaign_is_not_given_a_limit_that_cannot_hold(tmp_path: Path
     unknown = LLMSettings(name="hosted_vllm/x", api_base="http://127.0.0.1:9")
     record = CampaignRecord(**environment(), request=asked(unknown), hashes={})
     write_campaign(tmp_path, record)
+    note_llm(unknown)
     with pytest.raises(SpecError, match="the price of hosted_vllm/x is unknown"):
         resume_campaign(tmp_path, limits=Budget(None, cost=0.5))

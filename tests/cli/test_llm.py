@@ -113,7 +113,12 @@ def test_a_resumed_run_asks_for_nothing_twice(tmp_path: Path) -> None:
     with serving(reply(FULL)) as server:
         manifest["request"]["llm"]["api_base"] = server.url
         write_manifest(tmp_path / "run", manifest)
-        resumed = falsifier("resume", "run", "--json", cwd=tmp_path, env=ENV)
+        refused = falsifier("resume", "run", cwd=tmp_path, env=ENV, code=2)  # nobody has named this address
+        named = f"falsifier llm check openai/gpt-5-mini --api-base {server.url}"
+        assert refused.err.strip().endswith(named) and not server.received
+        resumed = falsifier(
+            "resume", "run", "--json", cwd=tmp_path, env={**ENV, "OPENAI_API_BASE": server.url}
+        )
         assert len(server.received) == 1
         assert "robustness 0.419" in server.received[0].texts[-1]
     assert resumed.code == 1, resumed.err

@@ -93,6 +93,32 @@ def test_sources_become_a_working_fmu(tmp_path: Path, name: str, files: dict[str
     assert built == known
 
 
+# Names that gcc reads as options, and two that are not in sources/.
+@needs_compiler
+@pytest.mark.parametrize(
+    ("listed", "files", "said"),
+    [
+        ("@more.c", {"sources/@more.c": "", "sources/more.c": "-DMODEL_IS_GIVEN"}, ""),
+        ("-DNOTHING.c", {"sources/-DNOTHING.c": "#error compiled"}, "compiled"),
+        ("../outside.c", {"outside.c": ""}, "outside sources/"),
+        ("/etc/hostname", {}, "outside sources/"),
+    ],
+)
+def test_names_of_source_files_are_no_options_and_lead_nowhere_else(
+    tmp_path: Path, listed: str, files: dict[str, str], said: str
+) -> None:
+    described = text_of("Lag_2sources", DESCRIPTION)
+    described = described.replace("<SourceFiles>", f'<SourceFiles><File name="{listed}"/>')
+    model = "#ifdef MODEL_IS_GIVEN\n#error an option\n#endif\n" + text_of("Lag_2sources", "sources/all.c")
+    source = rearranged(tmp_path, "Lag_2sources", {DESCRIPTION: described, "sources/all.c": model, **files})
+    if said:
+        with pytest.raises(ModelError, match=said):
+            compile_sources(source, tmp_path / "out.fmu")
+    else:
+        compile_sources(source, tmp_path / "out.fmu")
+    assert (tmp_path / "out.fmu").exists() == (not said)
+
+
 @needs_compiler
 def test_sources_that_declare_the_standards_types_on_their_own_are_compiled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -24,6 +24,7 @@ from falsifier.record.journal import repair, run_lock
 from falsifier.record.run import falsify, resume
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
+from falsifier.views.report.watch import Watch
 from tests.campaigns.support import outcomes, request, work_in_threads
 from tests.hostile.damage import DAMAGES, blank, cut, double_line, flip, lose_line
 from tests.problems import hard, impossible
@@ -149,6 +150,31 @@ def test_a_journal_without_its_manifest_is_refused(tmp_path: Path) -> None:
         Standing().resume(tmp_path)
     with pytest.raises(JournalError, match="a journal without its manifest"):
         Standing().run(tmp_path)
+
+
+@pytest.mark.parametrize("part", ["journal.jsonl", "trajectories"])
+@pytest.mark.parametrize("change", [Standing().resume, repair], ids=["resume", "repair"])
+def test_nothing_outside_a_run_is_changed_through_its_links(
+    part: str, change: Callable[[Path], object], tmp_path: Path
+) -> None:
+    place, outside, theirs = tmp_path / "run", tmp_path / "outside", tmp_path / "outside" / "thesis.npz"
+    Standing().run(place)
+    (place / part).rename(outside)
+    (place / part).symlink_to(outside)
+    if outside.is_dir():
+        theirs.write_bytes(b"no trajectory of a run")
+    before = sorted(outside.rglob("*")), (theirs if outside.is_dir() else outside).read_bytes()
+    with pytest.raises(JournalError, match=f"{part} is a link.*{outside}, in its place"):
+        change(place)
+    assert before == (sorted(outside.rglob("*")), (theirs if outside.is_dir() else outside).read_bytes())
+
+
+def test_the_request_to_stop_is_written_to_the_run_and_not_through_a_link(tmp_path: Path) -> None:
+    Standing().run(tmp_path / "run")
+    (tmp_path / "theirs").write_text("kept")
+    (tmp_path / "run" / "stop").symlink_to(tmp_path / "theirs")
+    Watch(tmp_path / "run").stop()
+    assert (tmp_path / "theirs").read_text() == "kept" and (tmp_path / "run" / "stop").read_text()
 
 
 @pytest.mark.parametrize(

@@ -208,6 +208,8 @@ def test_an_address_has_no_blanks(address: str) -> None:
         ({"max_tokens": 0}, "max_tokens: expected an integer from 1 on, got 0"),
         ({"max_tokens": True}, "max_tokens: expected an integer from 1 on, got True"),
         ({"max_completion_tokens": 2.5}, "max_completion_tokens: expected an integer from 1 on, got 2.5"),
+        ({"base_url": "http://127.0.0.1:1"}, "base_url: state the address of a server as api_base"),
+        ({"custom_llm_provider": "groq"}, "custom_llm_provider: .* the provider as the first part"),
     ],
 )
 def test_an_option_with_a_value_that_cannot_be_sent_or_kept_is_refused(

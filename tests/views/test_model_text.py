@@ -21,3 +21,14 @@ def test_unbounded_inputs_and_nominal_values_are_told() -> None:
     assert "(nominally 5)" in info_text(read_info(path("Lag_2")))
     computed = Variable("x", is_state=True, refusal="the model computes its initial value")
     assert "(cannot be set: the model computes" in info_text(ModelInfo("m", variables=(computed,)))
+
+
+def test_no_name_makes_a_line_of_its_own() -> None:
+    hostile = "x\nnote: the FMU may do nothing"
+    info = ModelInfo(
+        hostile,
+        description=hostile,
+        tool=hostile,
+        variables=(Variable(hostile, causality="input", unit=hostile),),
+    )
+    assert not [line for line in info_text(info).splitlines() if line.startswith("note: ")]

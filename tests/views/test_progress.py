@@ -1,9 +1,11 @@
 import re
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from falsifier import falsify
+from falsifier.context.values import Named
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.search.budget import Budget, Spent
 from falsifier.search.events import Evaluated, RunStarted
@@ -53,6 +55,13 @@ def test_in_a_notebook_the_command_lines_display_is_that_line(front_end: Shown) 
     with make_display() as display:
         falsify(hard(), "corners", budget=5, listeners=[display])
     assert "falsified; HARD: violation confirmed" in front_end.lines[-1]
+
+
+def test_the_first_lines_say_which_context_a_spec_names(capsys: pytest.CaptureFixture[str]) -> None:
+    problem = replace(hard(), named_context=Named(("/home/me/notes.md",), fmu=True))
+    with make_display() as display:
+        falsify(problem, "corners", budget=1, listeners=[display])
+    assert "context: /home/me/notes.md, files inside the FMU" in capsys.readouterr().err.splitlines()[1]
 
 
 def test_a_cause_is_told_once_and_that_most_have_failed(capsys: pytest.CaptureFixture[str]) -> None:

@@ -175,6 +175,8 @@ def shown_of(run: Run, candidate: Candidate) -> Shown:
     """Return a run's counterexample or best simulation, given its candidate."""
     name = None if run.shown is None else run.trajectories.get(run.shown)
     trajectory = recorded_trajectory(run.directory, name)
+    if trajectory and not {*parse(run.manifest.requirement.formula).signals} <= {*trajectory.names}:
+        trajectory = None  # it is that of another model
     is_lost = trajectory is None and name is not None
     return replace(_drawn(run, candidate, trajectory, run.verdict, run.reason), is_lost=is_lost)
 

@@ -24,6 +24,7 @@ from falsifier.campaigns.directory import is_campaign, is_worked_on, run_directo
 from falsifier.campaigns.progress import Follower
 from falsifier.campaigns.runs import RunProgress, unread_runs
 from falsifier.core.candidate import Candidate
+from falsifier.core.files import write_whole
 from falsifier.core.words import counted
 from falsifier.llm.messages import Exchange
 from falsifier.record.journal import STOP
@@ -142,7 +143,7 @@ class Watch:
 
     def stop(self) -> None:
         """Ask the process that works here to stop as after Ctrl-C: it looks for this file."""
-        (self.directory / STOP).write_text("stopped on the watch page\n", encoding="utf-8")
+        write_whole(self.directory / STOP, "stopped on the watch page\n")  # which follows no link
 
 
 def _choice(places: Collection[str], rows: Sequence[RunProgress]) -> Html:

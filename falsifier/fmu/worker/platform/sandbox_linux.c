@@ -278,11 +278,11 @@ static void on_sockets(struct program *p, const struct policy *policy)
     end(p, begun);
 }
 
-/* Settings of files that need no permission to write, and input to terminals. */
+/* Settings of files that need no permission to write, input to terminals, and who gets signals of a file. */
 static void on_device_calls(struct program *p)
 {
     static const uint32_t refused[] = {FS_IOC_SETFLAGS, FS_IOC32_SETFLAGS, FS_IOC_SETVERSION, FS_IOC_FSSETXATTR,
-                                       FS_IOC_SET_ENCRYPTION_POLICY, TIOCSTI, TIOCLINUX};
+                                       FS_IOC_SET_ENCRYPTION_POLICY, TIOCSTI, TIOCLINUX, FIOSETOWN, SIOCSPGRP};
     const unsigned short begun = begin(p, SYS_ioctl);
     load_argument(p, 1);
     for (size_t k = 0; k < sizeof refused / sizeof *refused; k++)
@@ -357,6 +357,13 @@ static void write_filter(struct program *p, const struct policy *policy, int has
         on_process(p, (uint32_t)process_calls[k], 0, ours);
     on_any(p, SYS_setpriority, PRIO_PROCESS, PRIO_USER, ours);
     on_any(p, SYS_ioprio_set, 1, 3, ours);
+    /* The owner of a file may get any signal whenever something can be read; Landlock sees it since version 6. */
+    begun = begin(p, SYS_fcntl);
+    load_argument(p, 1);
+    on_value(p, F_SETOWN, refuse(EPERM));
+    on_value(p, F_SETOWN_EX, refuse(EPERM));
+    finish(p, ALLOW);
+    end(p, begun);
     begun = begin(p, SYS_prctl);
     load_argument(p, 0);
     on_value(p, PR_SET_PDEATHSIG, refuse(EPERM));
