@@ -177,7 +177,7 @@ def signal_text(signal: Signal, *, stop_time: float) -> str:
         return f"constant {number(signal.values[0])}"
     manner = "constant pieces" if signal.interpolation == "constant" else signal.interpolation
     even = even_times(len(signal.times), stop_time=stop_time, interpolation=signal.interpolation)
-    if np.allclose(signal.times, even, rtol=0, atol=1e-9 * max(stop_time, 1.0)):
+    if np.allclose(signal.times, even, rtol=0, atol=1e-9 * stop_time):
         return f"{manner}, {len(signal.values)} evenly spaced values {runs(signal.values)}"
     points = list(zip(signal.times, signal.values, strict=True))
     if signal.interpolation == "constant":
