@@ -1,7 +1,7 @@
 """Candidates and tables as text: the same on terminals, in notebooks, reports and messages to an LLM."""
 
 from collections.abc import Collection, Iterable, Sequence
-from math import inf
+from math import inf, log10
 from typing import Literal
 
 from falsifier.core.candidate import Candidate
@@ -11,6 +11,8 @@ from falsifier.core.space import SearchSpace
 
 # Maximum number of control points shown; longer signals are abbreviated in the middle.
 _SHOWN_POINTS = 12
+# Digits that all decimal numbers keep in a float, and those that tell any two floats apart.
+_EXACT_DIGITS, _MOST_DIGITS = 15, 17
 
 
 def with_unit(name: str, unit: str) -> str:
@@ -30,14 +32,37 @@ def in_unit(number: str, unit: str) -> str:
 def readable(value: float, digits: int = 6, sign: Literal["", "+"] = "") -> str:
     """Return a number with so many digits, a large one with its hundredths, a whole one with all digits.
 
-    Beyond 2^53, from where on all are whole, it has ten. The sign "+" is for numbers above zero, too.
+    Beyond 2^53, from where on all are whole, it has ten; with more than 15 digits it is the shortest text
+    that has the value. The sign "+" is for numbers above zero, too.
 
     >>> readable(1000000000000040.0), readable(1 / 3), readable(50 / 3, 4), readable(86399.95, 4, "+")
     ('1000000000000040', '0.333333', '16.67', '+86399.95')
     """
+    if digits > _EXACT_DIGITS:
+        return f"{value:{sign}}".removesuffix(".0")
     whole = 16 if abs(value) <= 2**53 else 10
     least = whole if float(value).is_integer() else min(10, len(f"{value:.0f}") + 2)
     return f"{value:{sign}.{max(digits, least)}g}"
+
+
+def resolving(value: float, difference: float, least: int = 6) -> int:
+    """Return how many digits of a number show a difference of this size; not fewer than usual.
+
+    >>> resolving(3.0, 0.5), resolving(1000000.0005, 0.001), resolving(0.1 + 0.2, 1e-16)
+    (6, 11, 17)
+    """
+    ratio = abs(value / difference) if difference else 0.0
+    return max(least, min(int(log10(ratio)) + 2, _MOST_DIGITS)) if 0.0 < ratio < inf else least
+
+
+def ends(low: float, high: float) -> tuple[str, str]:
+    """Return both ends of a range, with digits that show a hundredth of it.
+
+    >>> ends(0.0, 100.0), ends(999999.999, 1000000.001)
+    (('0', '100'), ('999999.999', '1000000.001'))
+    """
+    digits = resolving(max(abs(low), abs(high)), (high - low) / 100.0)
+    return readable(low, digits), readable(high, digits)
 
 
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
