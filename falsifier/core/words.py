@@ -68,15 +68,25 @@ def ends(low: float, high: float) -> tuple[str, str]:
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
     """Return what a candidate chooses, inputs first: ``input`` or ``parameter``, and the choice in words.
 
-    Units, and the names of parameters' numbers, are told if the search space is given, which has them.
+    Units, and the names of parameters' numbers, are told if the search space is given, which has them; then
+    constants that are not searched, which somebody stated, have all their digits.
     """
-    labels = {r.name: with_unit(r.name, r.unit) for r in space.ranges} if space is not None else {}
+    ranges = {r.name: r for r in space.ranges} if space is not None else {}
+    labels = {r.name: with_unit(r.name, r.unit) for r in ranges.values()}
     names = {r.name: number_names(r.kind, r.items) for r in space.parameters} if space is not None else {}
     chosen = {n: (v, names.get(n, {}).get(int(v))) for n, v in candidate.parameters.items()}
     signals = {n: s.stepped(inf if space is None else space.stop_time) for n, s in candidate.signals.items()}
-    facts = [("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in signals.items()]
+
+    def digits(name: str, value: float, least: int) -> int:
+        if name in ranges:
+            return resolving(value, (ranges[name].high - ranges[name].low) / 10_000.0, least)
+        return least if space is None else _MOST_DIGITS
+
+    told = {n: signal_text(s, digits(n, s.values[0], 6)) for n, s in signals.items()}
+    facts = [("input", f"{labels.get(n, n)} {text}") for n, text in told.items()]
     for n, (v, name) in chosen.items():
-        facts.append(("parameter", f"{labels.get(n, n)} = {v:.10g}{f' ({name})' if name else ''}"))
+        value = readable(v, digits(n, v, 10))
+        facts.append(("parameter", f"{labels.get(n, n)} = {value}{f' ({name})' if name else ''}"))
     return facts
 
 
@@ -95,10 +105,11 @@ def named(number: str, kind: str, items: Iterable[tuple[str, int]]) -> str:
     return f"{number} = {names[number]}" if number in names else number
 
 
-def signal_text(signal: Signal) -> str:
+def signal_text(signal: Signal, digits: int = 6) -> str:
     """Return the control points of a signal, its number of switches and its shortest dwell.
 
-    Switches and dwell help the reader judge whether the signal is plausible on the real system.
+    Switches and dwell help the reader judge whether the signal is plausible on the real system. Values and
+    times that are close to each other have more digits than usual; a constant has so many.
 
     >>> signal_text(Signal((0.0, 2.5), (100.0, 0.0), "constant"))
     'held: 100 at 0 s, 0 at 2.5 s (1 switch)'
@@ -106,14 +117,16 @@ def signal_text(signal: Signal) -> str:
     'constant 3'
     """
     if len(set(signal.values)) == 1:
-        return f"constant {readable(signal.values[0])}"
+        return f"constant {readable(signal.values[0], digits)}"
+    dwell = signal.shortest_dwell
+    change, pause = (max(signal.values) - min(signal.values)) / 1000.0, (dwell or 0.0) / 10.0
     points = [
-        f"{readable(v)} at {readable(t, 4)} s" for t, v in zip(signal.times, signal.values, strict=True)
+        f"{readable(v, resolving(v, change))} at {readable(t, resolving(t, pause, 4))} s"
+        for t, v in zip(signal.times, signal.values, strict=True)
     ]
     if len(points) > _SHOWN_POINTS:
         half = _SHOWN_POINTS // 2
         points = [*points[:half], f"... {len(points) - 2 * half} more ...", *points[-half:]]
-    dwell = signal.shortest_dwell
     lively = "" if dwell is None else f", shortest dwell {readable(dwell, 4)} s"
     form = "held" if signal.interpolation == "constant" else signal.interpolation
     return f"{form}: {', '.join(points)} ({counted(signal.switches, 'switch')}{lively})"

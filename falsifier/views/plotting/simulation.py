@@ -8,7 +8,7 @@ import numpy as np
 from falsifier.core.arguments import instance
 from falsifier.core.ranges import number_names
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import readable, shortened, with_unit
+from falsifier.core.words import candidate_facts, readable, shortened, with_unit
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -74,9 +74,8 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
         ValueError: if the evaluation has no trajectory.
     """
     drawn, verdict = _panels(problem, evaluation)
-    parameters = ", ".join(
-        f"{name} = {readable(value)}" for name, value in evaluation.candidate.parameters.items()
-    )
+    facts = candidate_facts(evaluation.candidate, problem.space)
+    parameters = ", ".join(text for kind, text in facts if kind == "parameter")
     first, *more = _decided(verdict)
     lines = [f"{problem.name}: {first}", *more, str(problem.requirement.formula), parameters]
     return plot_panels(drawn, verdict, "\n".join(wrapped(line, _TITLE_WIDTH) for line in lines if line))
