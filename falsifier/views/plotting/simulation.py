@@ -188,7 +188,7 @@ def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
     for text in inside.texts:
         text.set_visible(False)
     inside.set(xlim=(critical - length / 2, critical + length / 2), ylabel="")
-    near, k = abs(panel.times - critical) <= length / 2, abs(panel.times - critical).argmin()
+    near, k = abs(panel.times - critical) <= length / 4, abs(panel.times - critical).argmin()
     # Of several limits, the one that has this margin: others may be far off.
     bound = min(panel.bounds, key=lambda b: abs(abs(b.values[k] - panel.values[k]) - _margin(verdict)))
     within = near & (panel.times >= bound.start) & (panel.times <= bound.end)
@@ -197,6 +197,7 @@ def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
     margin = 0.1 * (high - low) or 1.0
     inside.set_ylim(low - margin, high + margin)
     inside.tick_params(labelsize=7)
+    inside.locator_params(axis="x", nbins=4)  # it is narrow, and times of microseconds are long
     ax.indicate_inset_zoom(inside)
 
 
