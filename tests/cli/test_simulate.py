@@ -52,6 +52,17 @@ def test_how_long_a_file_lasts_is_told(tmp_path: Path) -> None:
     assert "brake: [-3, 0] exceeds the model's limits" in done.err and "throttle:" not in done.err
 
 
+def test_changes_between_two_communication_points_are_noted(tmp_path: Path) -> None:
+    (tmp_path / "u.csv").write_text("time,throttle,brake\n0,0,0\n20.001,0,0\n20.002,100,0\n20.003,0,9\n")
+    given = ("simulate", "AT1", "--inputs", "u.csv")
+    done = falsifier(*given, cwd=tmp_path)
+    assert "throttle: changes 0.001 s apart may not be seen, as inputs are set every 0.01 s" in done.err
+    assert "brake" not in done.err, "it changes once"
+    assert "apart" not in falsifier(*given, "--interface", "model-exchange", cwd=tmp_path).err
+    (tmp_path / "u.csv").write_text("time,throttle,brake\n0,0,0\n20,0,0\n20.01,100,0\n20.02,0,0\n")
+    assert "apart" not in falsifier(*given, cwd=tmp_path).err
+
+
 def test_a_searched_input_that_is_not_given_is_told(tmp_path: Path) -> None:
     (tmp_path / "u.csv").write_text("time,throttle\n0,50\n")
     done = falsifier("simulate", "AT1", "--inputs", "u.csv", cwd=tmp_path)
