@@ -5,6 +5,7 @@ from math import inf, log10
 from typing import Literal
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.literals import digits
 from falsifier.core.ranges import InputRange, number_names
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
@@ -68,8 +69,7 @@ def ends(low: float, high: float) -> tuple[str, str]:
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
     """Return what a candidate chooses, inputs first: ``input`` or ``parameter``, and the choice in words.
 
-    Units, and the names of parameters' numbers, are told if the search space is given, which has them; then
-    constants that are not searched, which somebody stated, have all their digits.
+    Units, and the names of parameters' numbers, are told if the search space is given, which has them.
     """
     ranges = {r.name: r for r in space.ranges} if space is not None else {}
     labels = {r.name: with_unit(r.name, r.unit) for r in ranges.values()}
@@ -77,15 +77,18 @@ def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> l
     chosen = {n: (v, names.get(n, {}).get(int(v))) for n, v in candidate.parameters.items()}
     signals = {n: s.stepped(inf if space is None else space.stop_time) for n, s in candidate.signals.items()}
 
-    def digits(name: str, value: float, least: int) -> int:
-        if name in ranges:
-            return resolving(value, (ranges[name].high - ranges[name].low) / 10_000.0, least)
-        return least if space is None else _MOST_DIGITS
+    def needed(name: str, value: float, least: int) -> int:
+        if (
+            written := digits(value)
+        ) <= _EXACT_DIGITS:  # somebody's number, or a rounded one, is told as it is
+            return max(written, least)
+        width = ranges[name].high - ranges[name].low if name in ranges else 0.0
+        return resolving(value, width / 10_000.0, least)
 
-    told = {n: signal_text(s, digits(n, s.values[0], 6)) for n, s in signals.items()}
+    told = {n: signal_text(s, needed(n, s.values[0], 6)) for n, s in signals.items()}
     facts = [("input", f"{labels.get(n, n)} {text}") for n, text in told.items()]
     for n, (v, name) in chosen.items():
-        value = readable(v, digits(n, v, 10))
+        value = readable(v, needed(n, v, 10))
         facts.append(("parameter", f"{labels.get(n, n)} = {value}{f' ({name})' if name else ''}"))
     return facts
 
