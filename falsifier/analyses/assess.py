@@ -15,7 +15,7 @@ import numpy as np
 from falsifier.core.arguments import finite, whole
 from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.space import SearchSpace
-from falsifier.core.words import counted, in_unit, readable
+from falsifier.core.words import counted, ends, in_unit, readable
 from falsifier.engines.box import Proposal
 from falsifier.engines.simple import Uniform
 from falsifier.errors import SimulationError, SpecError
@@ -283,5 +283,5 @@ def _input_text(r: InputRange, space: SearchSpace) -> str:
 
 
 def _range_text(r: InputRange | ParameterRange) -> str:
-    limits = in_unit(f"[{readable(r.low)}, {readable(r.high)}]", r.unit)
+    limits = in_unit(f"[{', '.join(ends(r.low, r.high))}]", r.unit)
     return limits if r.kind == "real" else f"{limits}, each allowed number equally likely"

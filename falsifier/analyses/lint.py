@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import counted, listed, readable
+from falsifier.core.words import counted, ends, listed, readable
 from falsifier.engines.layout import fixed_layout
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
@@ -127,7 +127,7 @@ def _constants(problem: Problem) -> dict[str, float]:
 def _decided(problem: Problem, part: Formula, *, holds: bool) -> LintFinding:
     ranges = ranges_of(problem)
     bounds = [
-        f"{n} = {readable(low)}" if low == high else f"{n} in [{readable(low)}, {readable(high)}]"
+        f"{n} = {readable(low)}" if low == high else f"{n} in [{', '.join(ends(low, high))}]"
         for n in part.signals
         for low, high in [(ranges[n].low, ranges[n].high)]
     ]

@@ -14,7 +14,7 @@ from falsifier.cli.llm_options import connection_options, llm_option, llm_settin
 from falsifier.cli.output import as_shown, conclude, say
 from falsifier.core.files import bundled, write_whole
 from falsifier.core.literals import one_line, shell_word
-from falsifier.core.words import counted, named, parameterization_text, readable
+from falsifier.core.words import counted, ends, named, parameterization_text
 from falsifier.errors import SpecError
 from falsifier.problem.loading import load_source, sources_of
 from falsifier.problem.problem import Problem, held_text
@@ -67,7 +67,7 @@ def _problem_line(problem: Problem) -> str:
     space = problem.space
     shown = {}
     for r in space.ranges:
-        low, high = (named(readable(end), r.kind, r.items) for end in (r.low, r.high))
+        low, high = (named(end, r.kind, r.items) for end in ends(r.low, r.high))
         shown[r.name] = f"{r.name} [{low}, {high}]{r.manner}"
     searched = [f"{shown[r.name]} {parameterization_text(r)}" for r in space.inputs]
     searched += [shown[p.name] for p in space.parameters]

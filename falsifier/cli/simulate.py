@@ -13,13 +13,16 @@ from falsifier.cli.output import FAILED, as_shown, conclude
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_text, number_in, one_line
+from falsifier.core.model import GRID_ROUNDING
 from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
+from falsifier.core.words import readable
 from falsifier.counterexamples.case import recorded_inputs
 from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import Evaluation, simulate as simulate_inputs
 from falsifier.evaluation.input_file import read_inputs
+from falsifier.fmu import is_solved
 from falsifier.problem.joining import rights_notes, unit_notes
 from falsifier.problem.loading import load_source
 from falsifier.problem.problem import Problem
@@ -64,6 +67,9 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         for name, (low, high) in (tried | held).items():
             if excess := problem.info[name].excess(low, high):
                 warn(f"{name}: {f'{low:.12g}' if low == high else f'[{low:.12g}, {high:.12g}]'} {excess}")
+        for name, signal in signals.items():
+            if note := _unseen(problem, name, signal):
+                warn(note)
         known = {*signals, *stored.parameters, *given}
         if known and (kept := [n for n in problem.space.names if n not in known]):
             warn(f"no values given for {', '.join(kept)}: kept at the model's start value")
@@ -119,6 +125,17 @@ def _read(file: Path, problem: Problem) -> dict[str, Signal]:
     for note in found.notes(problem.experiment.stop_time):
         warn(f"{file}: {note}")
     return dict(found.signals)
+
+
+def _unseen(problem: Problem, name: str, signal: Signal) -> str:
+    """Say that a signal changes faster than the model is given inputs; empty if it does not."""
+    dwell, step = signal.shortest_dwell, problem.experiment.step
+    if dwell is None or dwell > step * (1.0 - GRID_ROUNDING) or is_solved(problem.model):
+        return ""
+    return (
+        f"{name}: changes {readable(dwell)} s apart may not be seen, as inputs are set every {step:g} s: "
+        "state a smaller --output-interval, or step_size in a spec"
+    )
 
 
 def _with_own_ranges(problem: Problem, candidate: Candidate) -> Problem:

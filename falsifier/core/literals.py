@@ -160,7 +160,7 @@ def digits(value: float) -> int:
     >>> digits(100.0), digits(0.05), digits(33.25)
     (1, 1, 4)
     """
-    return len(Decimal(repr(value)).normalize().as_tuple().digits) if value else 1
+    return len(Decimal(repr(float(value))).normalize().as_tuple().digits) if value else 1
 
 
 def shortest(value: float) -> str:

@@ -23,11 +23,11 @@ from falsifier.errors import SpecError
 Interpolation = Literal["pchip", "linear", "constant"]
 INTERPOLATIONS: tuple[str, ...] = get_args(Interpolation)
 
-# Signals have one value per time. A step between two slopes is a ramp this long in s, which ends at the time
-# of the step: shorter than any communication step, so that no simulation sees it, and longer than roundings.
-STEP_RAMP = 2e-9
-# Added before rounding down: in floating point 0.15 / 0.05 is slightly less than 3. In s, or in hold periods.
-_TIME_ROUNDING = 1e-9
+# A step between two slopes is a ramp, as signals have one value per time. It ends at the time of the step
+# and takes no more than this, in s and as a share of that time.
+_STEP_RAMP = 2e-9
+# Up to which share of it a time may be rounded down: in floating point 0.15 / 0.05 is slightly less than 3.
+TIME_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +92,7 @@ class Signal:
         if len(self.times) == 1:
             return np.full(at.shape, self.values[0])
         if self.hold is not None:
-            period = np.floor(at / self.hold + _TIME_ROUNDING).astype(np.intp)
+            period = np.floor(at / self.hold * (1.0 + TIME_ROUNDING)).astype(np.intp)
             return _held_values(self, int(period.max(initial=0)) + 1)[period]
         return _interpolate(self, at)
 
@@ -104,7 +104,7 @@ class Signal:
             (t - s)**2 and (t - s)**3. The last piece extends indefinitely.
         """
         if self.hold is not None and len(self.times) > 1:
-            values = _held_values(self, int(stop_time / self.hold + _TIME_ROUNDING) + 1)
+            values = _held_values(self, int(stop_time / self.hold * (1.0 + TIME_ROUNDING)) + 1)
             return constant_pieces(np.arange(len(values), dtype=np.float64) * self.hold, values)
         knots, values = np.asarray(self.times), np.asarray(self.values)
         if self.interpolation == "pchip" and len(knots) > 1:
@@ -123,13 +123,13 @@ class Signal:
         """Times in s of the control points; of constant pieces that are held, when they are sampled first."""
         if self.hold is None or self.interpolation != "constant":
             return self.times
-        return tuple(ceil((t - _TIME_ROUNDING) / self.hold) * self.hold for t in self.times)
+        return tuple(ceil(t / self.hold * (1.0 - TIME_ROUNDING)) * self.hold for t in self.times)
 
     def stepped(self, stop_time: float = inf) -> "Signal":
         """Return the same signal; held constant pieces begin where they are sampled, if that is in time."""
         if (moments := self.moments) is self.times:
             return self
-        last = stop_time * (1.0 + _TIME_ROUNDING)
+        last = stop_time * (1.0 + TIME_ROUNDING)
         points = {t: v for t, v in zip(moments, self.values, strict=True) if t <= last}
         return replace(self, times=tuple(points), values=tuple(points.values()))
 
@@ -147,7 +147,7 @@ class Signal:
     def shortest_dwell(self) -> float | None:
         """Shortest time in s between two changes of value, steps counted as one; None with fewer than two."""
         pairs = pairwise(self.switch_times)
-        return min((b - a for a, b in pairs if b - a > 2.0 * max(STEP_RAMP, ulp(b))), default=None)
+        return min((b - a for a, b in pairs if b - a > 2.0 * step_ramp(b)), default=None)
 
 
 @lru_cache(maxsize=256)
@@ -159,6 +159,14 @@ def even_times(count: int, *, stop_time: float, interpolation: Interpolation) ->
     """
     pieces = count if interpolation == "constant" else max(count - 1, 1)
     return tuple(stop_time * i / pieces for i in range(count))
+
+
+def step_ramp(time: float) -> float:
+    """Return how long in s the ramp is that stands for a step at this time.
+
+    It is shorter than any communication step, as simulations have at most ten million, and no rounding.
+    """
+    return max(_STEP_RAMP * min(time, 1.0), ulp(time))
 
 
 # The same values are needed twice in succession: for the simulation and for the trajectory's input columns.
@@ -173,7 +181,7 @@ def _interpolate(signal: Signal, at: NDArray[np.float64]) -> NDArray[np.float64]
     """Return the interpolated values of a signal with two or more control points, ignoring its hold."""
     knots, values = np.asarray(signal.times), np.asarray(signal.values)
     if signal.interpolation == "constant":
-        return np.asarray(values[np.searchsorted(knots, at + _TIME_ROUNDING, side="right") - 1])
+        return np.asarray(values[np.searchsorted(knots, at * (1.0 + TIME_ROUNDING), side="right") - 1])
     is_linear = signal.interpolation == "linear"
     curve = np.interp(at, knots, values) if is_linear else _evaluate(_pchip(signal.times, signal.values), at)
     return np.asarray(curve).clip(values.min(), values.max())  # rounding alone leaves the range

@@ -208,7 +208,7 @@ class SearchSpace:
         """Times of the control points as they will be simulated."""
         fixed = self.fixed_times(r)
         if signal.interpolation == r.interpolation and len(signal.times) == len(fixed):
-            rounding = 1e-9 * max(self.stop_time, 1.0)
+            rounding = 1e-9 * self.stop_time
             if all(abs(a - b) <= rounding for a, b in zip(signal.times, fixed, strict=True)):
                 return fixed
         _check_freedom(r, signal, self.stop_time)

@@ -1,16 +1,19 @@
 """Candidates and tables as text: the same on terminals, in notebooks, reports and messages to an LLM."""
 
 from collections.abc import Collection, Iterable, Sequence
-from math import inf
+from math import inf, log10
 from typing import Literal
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.literals import digits
 from falsifier.core.ranges import InputRange, number_names
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
 
 # Maximum number of control points shown; longer signals are abbreviated in the middle.
 _SHOWN_POINTS = 12
+# Digits that all decimal numbers keep in a float, and those that tell any two floats apart.
+_EXACT_DIGITS, _MOST_DIGITS = 15, 17
 
 
 def with_unit(name: str, unit: str) -> str:
@@ -30,14 +33,37 @@ def in_unit(number: str, unit: str) -> str:
 def readable(value: float, digits: int = 6, sign: Literal["", "+"] = "") -> str:
     """Return a number with so many digits, a large one with its hundredths, a whole one with all digits.
 
-    Beyond 2^53, from where on all are whole, it has ten. The sign "+" is for numbers above zero, too.
+    Beyond 2^53, from where on all are whole, it has ten; with more than 15 digits it is the shortest text
+    that has the value. The sign "+" is for numbers above zero, too.
 
     >>> readable(1000000000000040.0), readable(1 / 3), readable(50 / 3, 4), readable(86399.95, 4, "+")
     ('1000000000000040', '0.333333', '16.67', '+86399.95')
     """
+    if digits > _EXACT_DIGITS:
+        return f"{value:{sign}}".removesuffix(".0")
     whole = 16 if abs(value) <= 2**53 else 10
     least = whole if float(value).is_integer() else min(10, len(f"{value:.0f}") + 2)
     return f"{value:{sign}.{max(digits, least)}g}"
+
+
+def resolving(value: float, difference: float, least: int = 6) -> int:
+    """Return how many digits of a number show a difference of this size; not fewer than usual.
+
+    >>> resolving(3.0, 0.5), resolving(1000000.0005, 0.001), resolving(0.1 + 0.2, 1e-16)
+    (6, 11, 17)
+    """
+    ratio = abs(value / difference) if difference else 0.0
+    return max(least, min(int(log10(ratio)) + 2, _MOST_DIGITS)) if 0.0 < ratio < inf else least
+
+
+def ends(low: float, high: float) -> tuple[str, str]:
+    """Return both ends of a range, with digits that show a hundredth of it.
+
+    >>> ends(0.0, 100.0), ends(999999.999, 1000000.001)
+    (('0', '100'), ('999999.999', '1000000.001'))
+    """
+    digits = resolving(max(abs(low), abs(high)), (high - low) / 100.0)
+    return readable(low, digits), readable(high, digits)
 
 
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:
@@ -45,13 +71,25 @@ def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> l
 
     Units, and the names of parameters' numbers, are told if the search space is given, which has them.
     """
-    labels = {r.name: with_unit(r.name, r.unit) for r in space.ranges} if space is not None else {}
+    ranges = {r.name: r for r in space.ranges} if space is not None else {}
+    labels = {r.name: with_unit(r.name, r.unit) for r in ranges.values()}
     names = {r.name: number_names(r.kind, r.items) for r in space.parameters} if space is not None else {}
     chosen = {n: (v, names.get(n, {}).get(int(v))) for n, v in candidate.parameters.items()}
     signals = {n: s.stepped(inf if space is None else space.stop_time) for n, s in candidate.signals.items()}
-    facts = [("input", f"{labels.get(n, n)} {signal_text(s)}") for n, s in signals.items()]
+
+    def needed(name: str, value: float, least: int) -> int:
+        if (
+            written := digits(value)
+        ) <= _EXACT_DIGITS:  # somebody's number, or a rounded one, is told as it is
+            return max(written, least)
+        width = ranges[name].high - ranges[name].low if name in ranges else 0.0
+        return resolving(value, width / 10_000.0, least)
+
+    told = {n: signal_text(s, needed(n, s.values[0], 6)) for n, s in signals.items()}
+    facts = [("input", f"{labels.get(n, n)} {text}") for n, text in told.items()]
     for n, (v, name) in chosen.items():
-        facts.append(("parameter", f"{labels.get(n, n)} = {v:.10g}{f' ({name})' if name else ''}"))
+        value = readable(v, needed(n, v, 10))
+        facts.append(("parameter", f"{labels.get(n, n)} = {value}{f' ({name})' if name else ''}"))
     return facts
 
 
@@ -70,10 +108,11 @@ def named(number: str, kind: str, items: Iterable[tuple[str, int]]) -> str:
     return f"{number} = {names[number]}" if number in names else number
 
 
-def signal_text(signal: Signal) -> str:
+def signal_text(signal: Signal, digits: int = 6) -> str:
     """Return the control points of a signal, its number of switches and its shortest dwell.
 
-    Switches and dwell help the reader judge whether the signal is plausible on the real system.
+    Switches and dwell help the reader judge whether the signal is plausible on the real system. Values and
+    times that are close to each other have more digits than usual; a constant has so many.
 
     >>> signal_text(Signal((0.0, 2.5), (100.0, 0.0), "constant"))
     'held: 100 at 0 s, 0 at 2.5 s (1 switch)'
@@ -81,14 +120,16 @@ def signal_text(signal: Signal) -> str:
     'constant 3'
     """
     if len(set(signal.values)) == 1:
-        return f"constant {readable(signal.values[0])}"
+        return f"constant {readable(signal.values[0], digits)}"
+    dwell = signal.shortest_dwell
+    change, pause = (max(signal.values) - min(signal.values)) / 1000.0, (dwell or 0.0) / 10.0
     points = [
-        f"{readable(v)} at {readable(t, 4)} s" for t, v in zip(signal.times, signal.values, strict=True)
+        f"{readable(v, resolving(v, change))} at {readable(t, resolving(t, pause, 4))} s"
+        for t, v in zip(signal.times, signal.values, strict=True)
     ]
     if len(points) > _SHOWN_POINTS:
         half = _SHOWN_POINTS // 2
         points = [*points[:half], f"... {len(points) - 2 * half} more ...", *points[-half:]]
-    dwell = signal.shortest_dwell
     lively = "" if dwell is None else f", shortest dwell {readable(dwell, 4)} s"
     form = "held" if signal.interpolation == "constant" else signal.interpolation
     return f"{form}: {', '.join(points)} ({counted(signal.switches, 'switch')}{lively})"

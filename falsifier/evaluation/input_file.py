@@ -6,12 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from itertools import pairwise
-from math import nextafter
 from pathlib import Path
 
 from falsifier.core.literals import csv_cell, number_in
 from falsifier.core.model import ModelInfo, Variable
-from falsifier.core.signals import STEP_RAMP, Signal
+from falsifier.core.signals import Signal, step_ramp
 from falsifier.errors import SpecError, did_you_mean, in_section, written
 from falsifier.problem.unit_check import spelled
 from falsifier.stl.lexer import UNITS
@@ -185,7 +184,7 @@ def _sloped(points: Sequence[tuple[float, float]]) -> Signal:
     for time, value in points:
         if kept and kept[-1][0] == time:
             before = kept.pop()
-            start = min(time - STEP_RAMP, nextafter(time, 0.0))  # also where such a time is rounded
+            start = time - step_ramp(time)
             if before[1] != value and kept and kept[-1][0] < start:
                 kept.append((start, before[1]))
         # On a straight line through the last two points, the middle one changes nothing.

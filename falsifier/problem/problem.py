@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Literal
 
 from falsifier.context.values import Context, Named
 from falsifier.core.arguments import finite, instance, path_of, texts
+from falsifier.core.literals import shortest
 from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
 from falsifier.core.ranges import number_names
 from falsifier.core.space import SearchSpace
+from falsifier.core.words import ends
 from falsifier.errors import SpecError, did_you_mean
 from falsifier.fmu import System
 from falsifier.problem.requirement import Requirement
@@ -242,10 +244,10 @@ def _held_because(variable: Variable, info: ModelInfo, *, is_given: bool) -> str
     if variable.kind == "string":
         return "a text has no range"
     if variable.causality == "input":
-        if not variable.is_bounded:
-            return f"no range is given, and the {info.noun} specifies no min and max"
         low, high = variable.limits
-        return f"not named beside what is searched; range {low:g} to {high:g}"
+        if low is None or high is None:
+            return f"no range is given, and the {info.noun} specifies no min and max"
+        return f"not named beside what is searched; range {' to '.join(ends(low, high))}"
     return "no range is given"
 
 
@@ -254,10 +256,12 @@ def held_text(held: Iterable[Held]) -> str:
 
     >>> held_text([Held("u", "input", 1.0, "its value is given", "on"), Held("v", "input", None, "no range")])
     'u = 1 (on) (its value is given); v (no range)'
+    >>> held_text([Held("p", "input", 1000000000500.1, "its value is given")])
+    'p = 1000000000500.1 (its value is given)'
     """
     by_reason: dict[str, list[str]] = {}
     for each in held:
-        value = each.value if isinstance(each.value, str | None) else f"{each.value:g}"
+        value = each.value if isinstance(each.value, str | None) else shortest(each.value)
         item = f" ({each.item})" if each.item else ""
         said = each.name if value is None else f"{each.name} = {value}{item}"
         by_reason.setdefault(each.reason, []).append(said)

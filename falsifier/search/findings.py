@@ -8,7 +8,7 @@ from typing import Literal
 from falsifier.core.literals import toml_key
 from falsifier.core.ranges import InputRange
 from falsifier.core.space import SearchSpace
-from falsifier.core.words import counted
+from falsifier.core.words import counted, ends
 from falsifier.engines import DEFAULT_ENGINE
 from falsifier.errors import written
 from falsifier.problem.grid import default_freedom, smallest_window
@@ -123,7 +123,7 @@ def _fastest(r: InputRange, space: SearchSpace) -> str:
         return f"{r.name} had {counted(r.control_points, 'held piece')} of {piece:.4g} s"
     return (
         f"{r.name} had {counted(r.control_points, 'control point')} ({r.interpolation}) and needed "
-        f"{piece:.4g} s from {r.low:g} to {r.high:g}"
+        f"{piece:.4g} s from {' to '.join(ends(r.low, r.high))}"
     )
 
 

@@ -7,20 +7,17 @@ to the left operand too. For until, too, the path goes to the left operand if bo
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf, log10
 from typing import NamedTuple
 
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import in_unit, readable
+from falsifier.core.words import in_unit, readable, resolving
 from falsifier.stl import formula as stl
 from falsifier.stl.expression import Expression, Number
-from falsifier.stl.margins import is_on_limit
+from falsifier.stl.margins import is_on_limit, shown
 from falsifier.stl.program import CompiledPart, Floats
 
-# Digits of numbers; of values that are compared more if their difference is small.
-_DIGITS, _MOST_DIGITS = 6, 12
 # Margin of a Boolean signal that is true.
 _OF_TRUTH = 0.5
 
@@ -226,9 +223,7 @@ def valued(side: Expression, values: Mapping[str, float], margin: float, unit: s
         return str(side)
     value = float(side.evaluate(values))
     # So many digits that both sides read as different.
-    ratio = 0.0 if is_on_limit(margin) else abs(value / margin)
-    digits = log10(ratio) + 2 if 0.0 < ratio < inf else 0.0
-    return in_unit(f"{side} = {readable(value, int(np.clip(digits, _DIGITS, _MOST_DIGITS)))}", unit)
+    return in_unit(f"{side} = {readable(value, resolving(value, shown(margin)))}", unit)
 
 
 def _over(window: tuple[float, float] | None) -> str:

@@ -10,7 +10,7 @@ from falsifier.analyses.coverage import FAST, PACES, SLOW, Coverage, ModeCoverag
 from falsifier.analyses.formalize import Difference, Formalized, Reading
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import aligned, counted, listed, readable, with_unit
+from falsifier.core.words import aligned, counted, ends, listed, readable, with_unit
 from falsifier.stl.margins import margin_words, signed
 from falsifier.views.text import Fact, llm_use
 
@@ -102,7 +102,7 @@ def coverage_json(found: Coverage) -> dict[str, Any]:
 
 
 def _span(low: float, high: float) -> str:
-    return readable(low) if low == high else f"{readable(low)} to {readable(high)}"
+    return readable(low) if low == high else " to ".join(ends(low, high))
 
 
 def _indented(rows: Iterable[Sequence[str]]) -> list[str]:

@@ -9,7 +9,7 @@ from typing import Any
 from falsifier.context.simulink import Diagram, structure_text
 from falsifier.core.literals import one_line
 from falsifier.core.model import ModelInfo, Variable
-from falsifier.core.words import aligned, counted, readable
+from falsifier.core.words import aligned, counted, readable, resolving
 
 # Maximum rows of a table: models may have thousands of parameters or states.
 _SHOWN_VARIABLES = 60
@@ -68,18 +68,22 @@ def model_json(info: ModelInfo) -> dict[str, Any]:
 
 def _cells(v: Variable) -> tuple[str, ...]:
     unit = f"{v.unit} (displayed in {v.display_unit})" if v.display_unit else v.unit
-    low, high = _number(v.low), _number(v.high)
+    width = v.high - v.low if v.low is not None and v.high is not None else 0.0
+    low, high, start = (_number(value, width) for value in (v.low, v.high, v.start))
     if v.causality == "input" and v.kind == "real":
         low, high = low or "unbounded", high or "unbounded"
     is_asked = v.refusal and (v.causality == "parameter" or v.is_state)
     refusal = f"cannot be set: {v.refusal}" if is_asked else ""
     said = (refusal, v.items_text, "" if v.nominal is None else f"nominally {readable(v.nominal)}")
     description = " ".join([*v.description.split(), *(f"({text})" for text in said if text)])
-    return (v.name, v.kind, unit, low, high, _number(v.start), description)
+    return (v.name, v.kind, unit, low, high, start, description)
 
 
-def _number(value: float | str | None) -> str:
-    return "" if value is None else readable(value) if isinstance(value, int | float) else value
+def _number(value: float | str | None, width: float) -> str:
+    """Return a number with digits that show a hundredth of the width of its range."""
+    if isinstance(value, int | float):
+        return readable(value, resolving(value, width / 100.0))
+    return value or ""
 
 
 def simulink_text(diagram: Diagram) -> str:

@@ -17,7 +17,7 @@ from falsifier.analyses.margin import Margin
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import ModelInfo
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import candidate_facts, counted, readable
+from falsifier.core.words import candidate_facts, counted, ends, readable
 from falsifier.counterexamples.explain import Explanation
 from falsifier.counterexamples.robustness_map import RobustnessMap
 from falsifier.counterexamples.shrink import Shrunk
@@ -67,7 +67,7 @@ def problem_html(problem: Problem) -> str:
         *((f"fixed {name}", readable(value)) for name, value in problem.parameters.items()),
     ]
     header = ("searched", "unit", "range", "control points", "description")
-    bounds = {r.name: f"{readable(r.low)} to {readable(r.high)}{r.manner}" for r in problem.space.ranges}
+    bounds = {r.name: f"{' to '.join(ends(r.low, r.high))}{r.manner}" for r in problem.space.ranges}
     points = {r.name: f"{r.control_points}, {r.interpolation}" for r in problem.space.inputs}
     rows = [
         (r.name, r.unit, bounds[r.name], points.get(r.name, "one value"), r.description)

@@ -9,7 +9,7 @@ from falsifier.analyses.assess import Assurance
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.literals import one_line, shell_word
 from falsifier.core.ranges import number_names
-from falsifier.core.words import candidate_facts, counted, in_unit, readable
+from falsifier.core.words import candidate_facts, counted, in_unit, readable, resolving
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation
@@ -19,8 +19,8 @@ from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
 from falsifier.search.parameterization import parameterization_note, parameterization_of
 from falsifier.search.result import Result
-from falsifier.stl import Verdict
-from falsifier.stl.margins import margin_words, signed
+from falsifier.stl import Verdict, parse
+from falsifier.stl.margins import margin_words, shown, signed
 
 # A name and what is said under it: a row of a table, or a line of text.
 Fact = tuple[str, str]
@@ -164,10 +164,11 @@ def margin_facts(verdict: Verdict | None, units: Mapping[str, str], labels: Labe
     """Return the robustness, what decided it and when, with the values then; nothing without a verdict."""
     if verdict is None:
         return []
-    values = []
+    values, compared = [], parse(verdict.predicate).signals if verdict.predicate else ()
     for name, value in verdict.values.items():
         label = labels[name].get(int(value)) if labels.get(name) else None
-        words = in_unit(f"{name} = {readable(value)}", units.get(name, ""))
+        difference = shown(verdict.robustness) if name in compared else 0.0
+        words = in_unit(f"{name} = {readable(value, resolving(value, difference))}", units.get(name, ""))
         values.append(f"{words} ({label})" if label else words)
     meaning = margin_words(verdict.robustness, verdict.predicate)
     return [

@@ -36,6 +36,9 @@ def test_check_says_what_is_searched(tmp_path: Path) -> None:
     drive = '[parameters.finalDrive]\nrange = [3, 3.5]\nscale = "log"\n'
     done = falsifier("check", spec(tmp_path, WIDE + drive), cwd=tmp_path)
     assert "finalDrive [3, 3.5] in decades" in done.out
+    narrow = "[parameters.finalDrive]\nrange = [3.2300001, 3.2300002]\n"
+    done = falsifier("check", spec(tmp_path, WIDE + narrow), cwd=tmp_path)
+    assert "finalDrive [3.2300001, 3.2300002]" in done.out
 
 
 GOOD = {

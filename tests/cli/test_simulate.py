@@ -40,7 +40,7 @@ def test_a_string_gets_the_text_that_was_typed(tmp_path: Path) -> None:
 
 def test_values_beyond_the_models_limits_are_simulated_and_drawn(tmp_path: Path) -> None:
     done = falsifier("simulate", "AT1", "--set", "throttle=100.000001", "--out", "out", cwd=tmp_path)
-    assert "constant 100" in done.out, done.err
+    assert "constant 100.000001" in done.out, done.err
     assert "throttle: 100.000001 exceeds the model's limits for 'throttle', [0, 100]" in done.err
     assert (tmp_path / "out" / "trajectory.png").is_file()
 
@@ -59,6 +59,17 @@ def test_how_long_a_file_lasts_is_told(tmp_path: Path) -> None:
     done = falsifier("simulate", "AT1", "--inputs", "u.csv", cwd=tmp_path)
     assert "u.csv: ends at 49.999999 s; the last values are kept until 50 s" in done.err
     assert "brake: [-3, 0] exceeds the model's limits" in done.err and "throttle:" not in done.err
+
+
+def test_changes_between_two_communication_points_are_noted(tmp_path: Path) -> None:
+    (tmp_path / "u.csv").write_text("time,throttle,brake\n0,0,0\n20.001,0,0\n20.002,100,0\n20.003,0,9\n")
+    given = ("simulate", "AT1", "--inputs", "u.csv")
+    done = falsifier(*given, cwd=tmp_path)
+    assert "throttle: changes 0.001 s apart may not be seen, as inputs are set every 0.01 s" in done.err
+    assert "brake" not in done.err, "it changes once"
+    assert "apart" not in falsifier(*given, "--interface", "model-exchange", cwd=tmp_path).err
+    (tmp_path / "u.csv").write_text("time,throttle,brake\n0,0,0\n20,0,0\n20.01,100,0\n20.02,0,0\n")
+    assert "apart" not in falsifier(*given, cwd=tmp_path).err
 
 
 def test_a_searched_input_that_is_not_given_is_told(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import ast
 import re
 
+import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
@@ -74,6 +75,18 @@ def test_inputs_come_first_with_the_units_of_the_space() -> None:
     assert candidate_facts(Candidate(parameters={"mode": 7.0}), modes) == [("parameter", "mode = 7 (Eco)")]
     assert in_one_line(CANDIDATE) == f"u {told}; mass = 0.3333333333", "without a space no unit is known"
     assert in_one_line(Candidate()) == ""
+
+
+def test_what_is_close_to_each_other_has_the_digits_that_it_needs() -> None:
+    narrow = SearchSpace(
+        (InputRange("u", 1e12, 1e12 + 1.0),), (ParameterRange("mass", 999999.999, 1000000.001),), 10.0
+    )
+    chosen = Candidate({"u": Signal((0.0,), (1e12 + 1 / 3,))}, {"mass": 1000000.0005})
+    assert in_one_line(chosen, narrow) == "u constant 1000000000000.3334; mass = 1000000.0005"
+    assert in_one_line(chosen).endswith("; mass = 1000000.0005"), "what somebody wrote has all its digits"
+    assert in_one_line(Candidate(parameters={"mass": np.float64(0.25)})) == "mass = 0.25"
+    pulse = Signal((0.0, 0.0012345, 0.0012346), (1e6, 1e6 + 1e-3, 1e6), "constant")
+    assert "1000000.001 at 0.0012345 s, 1000000 at 0.0012346 s" in signal_text(pulse)
 
 
 def test_a_long_signal_is_cut_in_the_middle_and_says_how_lively_it_is() -> None:

@@ -232,6 +232,17 @@ def test_hold_samples_at_its_own_multiples_in_spite_of_rounding() -> None:
     np.testing.assert_allclose(signal.sample(times), expected, atol=1e-12)
 
 
+@pytest.mark.parametrize("step", [1e-13, 1e-9, 3e-3, 1e3 / 3.0])
+@pytest.mark.parametrize("is_held", [False, True])
+def test_every_step_of_a_simulation_of_any_length_takes_its_own_piece(step: float, is_held: bool) -> None:
+    times = tuple(float(f"{k * step:.12g}") for k in range(1000))
+    pieces = tuple(float(k) for k in range(1000))
+    signal = Signal(times, pieces, "constant", hold=step if is_held else None)
+    assert signal.sample(np.arange(1000, dtype=np.float64) * np.float64(step)).tolist() == list(pieces)
+    assert signal.stepped().values == pieces
+    assert signal.shortest_dwell == pytest.approx(step)
+
+
 def test_between_control_points_no_value_is_outside_of_theirs() -> None:
     signal = Signal.evenly([0.1, 0.3, 0.1, 0.1], stop_time=50.0, hold=1 / 3)  # next to 50/3, by rounding
     values = signal.sample(np.linspace(0.0, 50.0, 151))

@@ -39,7 +39,7 @@ def test_a_repeated_time_is_a_step_with_the_later_value(tmp_path: Path) -> None:
     assert sloped.sample(np.array([1.0, 1.99, 2.0, 3.0])) == pytest.approx([1, 1.99, 9, 10])
 
 
-@pytest.mark.parametrize("time", [0.01, 2.0, 3.2e7, 1e12])
+@pytest.mark.parametrize("time", [3e-12, 5e-9, 0.01, 2.0, 3.2e7, 1e12])
 def test_a_step_between_slopes_is_one_at_any_time(time: float, tmp_path: Path) -> None:
     text = f"t,u\n0,0\n{time!r},2\n{time!r},9\n{2 * time!r},11\n{4 * time!r},2\n"
     signal = read_inputs(written(tmp_path, text), INFO).signals["u"]

@@ -94,8 +94,9 @@ def test_events_inside_of_steps(name: str) -> None:
 
 def test_parameters_that_do_not_fit_are_refused_before_the_simulation() -> None:
     with pytest.raises(SimulationError, match=r"'misdeed'") as caught:
-        run(isolated("Misdeeds_2"), ("y",), parameters={"misdeed": 1e12})
+        run(isolated("Misdeeds_2"), ("y",), parameters={"misdeed": 2.0**31})
     assert caught.value.time == 0.0
+    assert "from 2147483648 to 2147483648" in str(caught.value) and "2147483647" in str(caught.value)
 
 
 def test_where_an_input_is_driven_its_range_is_looked_at_over_the_whole_time() -> None:

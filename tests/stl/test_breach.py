@@ -33,6 +33,13 @@ def test_of_an_implication_the_consequence_is_told_while_the_condition_held() ->
     assert "load = 1234567 kN" in broken("G[0,6] (load < 5)", load=[*LOAD[1:], 1234567.0]).text
 
 
+def test_a_value_is_told_with_as_many_digits_as_its_margin_needs() -> None:
+    load = [*LOAD[1:], 1000000000500.1]
+    assert "load = 1000000000500.1 kN" in broken("G[0,6] (load <= 1000000000500)", load=load).text
+    tiny = broken("G[0,6] (load <= 0.3)", load=[0.3] * len(LOAD[1:]) + [0.1 + 0.2]).text
+    assert "load = 0.30000000000000004 kN" in tiny
+
+
 @pytest.mark.parametrize(
     "formula",
     ["G[0,6] (not (abs(load) <= 0.05) or error <= 3)", "G[0,6] not (abs(load) <= 0.05 and not (error <= 3))"],

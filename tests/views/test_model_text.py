@@ -14,6 +14,12 @@ def test_all_variables_of_a_large_model_have_a_line_each() -> None:
     assert len(model_json(info)["variables"]) == 20_000
 
 
+def test_limits_that_are_close_to_each_other_are_told_apart() -> None:
+    mass = Variable("mass", causality="parameter", low=999999.999, high=1000000.001, start=1000000.0005)
+    (row,) = [x for x in info_text(ModelInfo("m", variables=(mass,))).splitlines() if x.startswith("mass ")]
+    assert row.split()[-3:] == ["999999.999", "1000000.001", "1000000.0005"]
+
+
 def test_unbounded_inputs_and_nominal_values_are_told() -> None:
     lines = info_text(read_info(path("HugeLimits_2"))).splitlines()
     (row,) = [line for line in lines if line.startswith("u ")]

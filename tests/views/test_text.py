@@ -14,6 +14,7 @@ from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
 from falsifier.search.result import Result
+from falsifier.stl import Verdict
 from falsifier.testing import lag_problem
 from falsifier.views.report import html_report, markdown_report
 from falsifier.views.text import margin_facts, result_json, result_text, results_text
@@ -42,6 +43,11 @@ def test_a_counterexample_is_told_with_its_verdict_inputs_and_reason(found: Resu
     for part in (found.counterexample.reason, f"{found.robustness:+.6g}", *values):
         assert part in text
     assert "files" not in text, "nothing was recorded"
+
+
+def test_values_that_decided_are_told_apart_from_their_limit() -> None:
+    verdict = Verdict(-0.0005, 0.0, "x <= 1000000.0005", {"x": 1000000.001, "y": 1000000.001})
+    assert dict(margin_facts(verdict, {}, {}))["values then"] == "x = 1000000.001, y = 1000000"
 
 
 def test_items_are_told_with_their_names(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from math import ceil
 
 from falsifier.core.literals import modelica_path, modelica_string, one_line, python_docstring
 from falsifier.core.model import INTERFACE_TAGS, Model
-from falsifier.core.words import listed, readable
+from falsifier.core.words import listed, readable, resolving
 from falsifier.counterexamples.export import tables
 from falsifier.counterexamples.export.tables import text_of
 from falsifier.counterexamples.store import FILE_NAME
@@ -17,7 +17,7 @@ from falsifier.fmu.description.archive import WINDOWS, this_platform
 from falsifier.fmu.description.libraries import can_run_windows
 from falsifier.problem.problem import Problem
 from falsifier.stl import Verdict
-from falsifier.stl.margins import signed
+from falsifier.stl.margins import shown, signed
 
 # Rows that replay.py prints before and after the one at which what broke was farthest off.
 _SHOWN_ROWS = 3
@@ -57,7 +57,13 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         platforms=f"{_platforms(model)}.",
         recorded=_recorded_lines(verdict),
     )
+    named = ["time", *(n for n in experiment.outputs if n in problem.requirement.formula.signals)]
+    # The rows differ in time, and what is marked from its limit.
+    told = [resolving(verdict.values.get(n, 0.0), shown(verdict.robustness)) for n in named[1:]]
+    digits = max(resolving(experiment.stop_time, experiment.output_interval), *told, 0)
     return _template("replay.template").format(
+        digits=digits,
+        width=digits + 8,
         about=python_docstring(about),
         moment=verdict.moment,
         mark=repr(_mark_of(verdict)),
@@ -69,7 +75,7 @@ def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str
         tolerance=experiment.tolerance,
         inputs=repr(list(inputs)),
         outputs=repr({name: tuple(model.place(name)) for name in experiment.outputs}),
-        shown=repr(["time", *(n for n in experiment.outputs if n in problem.requirement.formula.signals)]),
+        shown=repr(named),
         around=_SHOWN_ROWS,
         every=round(experiment.output_interval / step),
     )

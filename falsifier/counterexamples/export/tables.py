@@ -14,12 +14,10 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_cell, plain
 from falsifier.core.model import Kind, Model, ModelInfo, Variable
-from falsifier.core.signals import Signal
+from falsifier.core.signals import TIME_ROUNDING, Signal
 from falsifier.fmu import FmuModel, is_solved
 from falsifier.problem.problem import Problem
 
-# Times that are less than this apart, in s, are one.
-_TIME_ROUNDING = 1e-9
 # Rows of a curve that a solver follows, at least.
 _CURVE_ROWS = 1000
 _SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
@@ -87,7 +85,8 @@ def _beginnings(problem: Problem, candidate: Candidate) -> NDArray[np.float64]:
         found.append(np.linspace(0.0, experiment.stop_time, _CURVE_ROWS + 1))
     begins = np.concatenate([*found, experiment.times[:1]])
     apart = np.abs(begins - np.rint(begins / experiment.step) * experiment.step)
-    return begins[(apart > _TIME_ROUNDING) & (begins < experiment.stop_time)]
+    is_apart = apart > TIME_ROUNDING * begins.clip(max=1.0)
+    return begins[is_apart & (begins < experiment.stop_time)]
 
 
 def _values(
@@ -97,7 +96,7 @@ def _values(
         signal = candidate.signals[variable.name]
         if is_solved(problem.model) and not variable.is_continuous:
             grid = problem.experiment.times  # on which a solver changes it
-            times = grid[np.searchsorted(grid, times + _TIME_ROUNDING, side="right") - 1]
+            times = grid[np.searchsorted(grid, times * (1.0 + TIME_ROUNDING), side="right") - 1]
         values = signal.sample(times)
         return values if variable.kind == "real" else np.rint(values)
     value = problem.parameters.get(variable.name, variable.start_number)

@@ -127,8 +127,8 @@ def given_values(
         values = inputs[name][:, 1] if name in inputs else np.array([parameters[name]])
         if not (low - 0.5 <= values.min() and values.max() <= high + 0.5):
             raise SimulationError(
-                f"{plan.model}: values from {values.min():g} to {values.max():g} do not fit {name!r}, "
-                f"whose type ranges from {low:g} to {high:g}",
+                f"{plan.model}: values from {values.min():.10g} to {values.max():.10g} do not fit {name!r}, "
+                f"whose type ranges from {low} to {high}",
                 time=0.0,
             )
     return given

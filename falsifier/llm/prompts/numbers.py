@@ -16,13 +16,15 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.ranges import InputRange, Range
 from falsifier.core.signals import Signal, even_times
 from falsifier.core.space import Dimension
+from falsifier.core.words import resolving
 from falsifier.llm.prompts.view import View
 from falsifier.stl.margins import is_on_limit
 
 # Significant digits of the largest value in a column of numbers.
 _COLUMN_DIGITS = 4
 _BOUND_DIGITS = 10
-_CHOSEN_DIGITS = 7
+# Digits of values that were rounded to decimals before, of which no more are left than were kept.
+_ROUNDED_DIGITS = 15
 # Digits of the width of a range to which values of signals and parameters are shown.
 _DIGITS_OF_RANGE = 4
 _DIGITS_OF_PARAMETER = 5
@@ -75,13 +77,17 @@ def plain(value: float, decimals: int) -> str:
 def bounds(low: float, high: float, digits: int = _BOUND_DIGITS) -> tuple[str, str]:
     """Bounds as text; rounded inward if rounded at all, so that a printed bound lies in the range.
 
+    There are more digits where the range is narrow for its place: a thousandth of it is shown.
+
     >>> bounds(0.0, 100.0), bounds(-1.25663706143591, 1 / 3)
     (('0', '100'), ('-1.256637061', '0.3333333333'))
     """
 
     def rounded(value: float, rounding: str) -> str:
-        return number(float(Context(prec=digits, rounding=rounding).create_decimal(Decimal(repr(value)))))
+        kept = Context(prec=needed, rounding=rounding).create_decimal(Decimal(repr(value)))
+        return number(float(kept), max(needed, _BOUND_DIGITS))
 
+    needed = resolving(max(abs(low), abs(high)), (high - low) / 1000.0, digits)
     return rounded(low, ROUND_CEILING), rounded(high, ROUND_FLOOR)
 
 
@@ -103,7 +109,7 @@ def runs(values: Sequence[float]) -> str:
     shortest_run = 4
     parts: list[str] = []
     for value, equal in groupby(values):
-        text, length = number(value, _CHOSEN_DIGITS), len(list(equal))
+        text, length = number(value, _ROUNDED_DIGITS), len(list(equal))
         is_long = length >= shortest_run and len(values) > 3 * shortest_run
         parts += [f'"{text} x {length}"'] if is_long else [text] * length
     return f"[{', '.join(parts)}]"
@@ -174,13 +180,13 @@ def signal_text(signal: Signal, *, stop_time: float) -> str:
     'constant 3'
     """
     if len(set(signal.values)) == 1:
-        return f"constant {number(signal.values[0])}"
+        return f"constant {number(signal.values[0], _ROUNDED_DIGITS)}"
     manner = "constant pieces" if signal.interpolation == "constant" else signal.interpolation
     even = even_times(len(signal.times), stop_time=stop_time, interpolation=signal.interpolation)
-    if np.allclose(signal.times, even, rtol=0, atol=1e-9 * max(stop_time, 1.0)):
+    if np.allclose(signal.times, even, rtol=0, atol=1e-9 * stop_time):
         return f"{manner}, {len(signal.values)} evenly spaced values {runs(signal.values)}"
     points = list(zip(signal.times, signal.values, strict=True))
     if signal.interpolation == "constant":
         points = [p for i, p in enumerate(points) if i == 0 or p[1] != points[i - 1][1]]
-    shown = ", ".join(f"[{number(t)}, {number(v, 7)}]" for t, v in points)
+    shown = ", ".join(f"[{number(t)}, {number(v, _ROUNDED_DIGITS)}]" for t, v in points)
     return f"{manner} from [time, value] points [{shown}]"

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -106,18 +107,29 @@ def _heat(ax: "Axes", xs: NDArray[np.float64], ys: NDArray[np.float64], counts: 
 
 def _ends(r: RangeCoverage) -> NDArray[np.float64]:
     """Return the ends of the parts, shape (parts + 1,); whole numbers stand in the middle of theirs."""
+    if numbers := _scattered(r):
+        return np.arange(-0.5, len(numbers), dtype=np.float64)
     edges = np.array(edges_of(r.searched))
     if len(edges) == 1 or edges[0, 0] == edges[0, 1]:
         return np.array([*(edges[:, 0] - 0.5), edges[-1, 1] + 0.5])
     return np.array([*edges[:, 0], edges[-1, 1]])
 
 
+def _scattered(r: RangeCoverage) -> list[int]:
+    """Return the numbers of an enumeration with gaps, such as 1, 2 and 255: they are drawn side by side."""
+    numbers = [int(low) for low, _ in edges_of(r.searched)] if r.searched.items else []
+    return numbers if any(b - a > 1 for a, b in pairwise(numbers)) else []
+
+
 def _whole(axis: "Axis", r: RangeCoverage) -> None:
     """Put the ticks of an integer, Boolean or enumeration at its numbers, with their names."""
     if r.searched.kind != "real":
         low, high = r.searched.low, r.searched.high
-        names = number_names(r.searched.kind, r.searched.items).items()
-        whole_ticks(axis, {number: name for number, name in names if low <= number <= high})
+        names = number_names(r.searched.kind, r.searched.items)
+        if numbers := _scattered(r):
+            whole_ticks(axis, {place: names[number] for place, number in enumerate(numbers)})
+        else:
+            whole_ticks(axis, {number: name for number, name in names.items() if low <= number <= high})
 
 
 def _label(r: RangeCoverage) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from falsifier.core.arguments import instance
 from falsifier.core.ranges import number_names
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import readable, shortened, with_unit
+from falsifier.core.words import candidate_facts, readable, shortened, with_unit
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -74,9 +74,8 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
         ValueError: if the evaluation has no trajectory.
     """
     drawn, verdict = _panels(problem, evaluation)
-    parameters = ", ".join(
-        f"{name} = {readable(value)}" for name, value in evaluation.candidate.parameters.items()
-    )
+    facts = candidate_facts(evaluation.candidate, problem.space)
+    parameters = ", ".join(text for kind, text in facts if kind == "parameter")
     first, *more = _decided(verdict)
     lines = [f"{problem.name}: {first}", *more, str(problem.requirement.formula), parameters]
     return plot_panels(drawn, verdict, "\n".join(wrapped(line, _TITLE_WIDTH) for line in lines if line))
@@ -189,7 +188,7 @@ def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
     for text in inside.texts:
         text.set_visible(False)
     inside.set(xlim=(critical - length / 2, critical + length / 2), ylabel="")
-    near, k = abs(panel.times - critical) <= length / 2, abs(panel.times - critical).argmin()
+    near, k = abs(panel.times - critical) <= length / 4, abs(panel.times - critical).argmin()
     # Of several limits, the one that has this margin: others may be far off.
     bound = min(panel.bounds, key=lambda b: abs(abs(b.values[k] - panel.values[k]) - _margin(verdict)))
     within = near & (panel.times >= bound.start) & (panel.times <= bound.end)
@@ -198,6 +197,7 @@ def _plot_inset(ax: "Axes", panel: Panel, verdict: Verdict) -> None:
     margin = 0.1 * (high - low) or 1.0
     inside.set_ylim(low - margin, high + margin)
     inside.tick_params(labelsize=7)
+    inside.locator_params(axis="x", nbins=4)  # it is narrow, and times of microseconds are long
     ax.indicate_inset_zoom(inside)
 
 

@@ -11,7 +11,7 @@ from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.literals import shell_word
 from falsifier.core.signals import Signal
-from falsifier.core.words import counted, in_unit, listed, readable, with_unit
+from falsifier.core.words import counted, in_unit, listed, readable, resolving, with_unit
 from falsifier.counterexamples.store import SHRUNK, beside
 from falsifier.engines import ENGINES
 from falsifier.problem.problem import held_text
@@ -97,7 +97,8 @@ def input_table(shown: Shown) -> Table:
     header, columns = ["time [s]"], []
     for name, signal in signals.items():
         header.append(f"{with_unit(name, shown.units.get(name, ''))}, {_course(signal)}")
-        columns.append({time: f"{v:.10g}" for time, v in zip(signal.times, signal.values, strict=True)})
+        points = zip(signal.times, signal.values, strict=True)
+        columns.append({time: _entered(shown, name, value) for time, value in points})
     times = sorted({time for column in columns for time in column})
     rows = [(f"{time:.10g}", *(column.get(time, "") for column in columns)) for time in times]
     return Table("Inputs", tuple(header), tuple(rows))
@@ -115,7 +116,14 @@ def _course(signal: Signal) -> str:
 def parameter_facts(shown: Shown) -> list[Fact]:
     """Return the parameters of a simulation with their values and units."""
     values = shown.candidate.parameters.items()
-    return [(name, in_unit(f"{value:.10g}", shown.units.get(name, ""))) for name, value in values]
+    return [(n, in_unit(_entered(shown, n, value), shown.units.get(n, ""))) for n, value in values]
+
+
+def _entered(shown: Shown, name: str, value: float) -> str:
+    """Return a value with digits to enter it by: ten, or more to show a millionth of its range."""
+    manifest = shown.run.manifest
+    widths = {r.name: r.high - r.low for r in (*manifest.inputs, *manifest.parameters)}
+    return readable(value, resolving(value, widths.get(name, 0.0) / 1e6, 10))
 
 
 def tried(section: Section) -> list[Fact]:

@@ -66,6 +66,25 @@ def test_the_replay_script_parts_long_names(capsys: pytest.CaptureFixture[str]) 
     assert header.split() == names and len(row.partition("  <-")[0]) == len(header)
 
 
+def test_the_replay_script_tells_a_value_from_a_limit_that_is_near(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    problem = load_problem("AT1")
+    evaluation = evaluate(problem, problem.space.admit(AT_INPUTS["held"]))
+    assert evaluation.verdict is not None
+    values = {**evaluation.verdict.values, "speed": 1000000.001}
+    near = replace(evaluation, verdict=replace(evaluation.verdict, robustness=-0.0005, values=values))
+    script = replay_script(problem, near, [])
+    assert script is not None
+    speed = np.full(3, 1000000.001)
+    table = np.zeros(3, [("time", float)])
+    exec(
+        script[script.index("shown = ") :],
+        {"result": table, "columns": {"time": table["time"], "speed": speed}},
+    )
+    assert "1000000.001  <- " in capsys.readouterr().out
+
+
 def test_the_replay_script_shows_what_broke_and_not_the_condition_that_decided() -> None:
     problem = load_problem("AT1")
     formula = parse("G[0,20] (speed >= 80 -> rpm <= 100)")

@@ -1,10 +1,12 @@
 """Inputs and numbers as prompts write them."""
 
+from dataclasses import replace
+
 from hypothesis import given, strategies as st
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
-from falsifier.llm.prompts.numbers import as_signals, bounds
+from falsifier.llm.prompts.numbers import as_signals, bounds, signal_text
 from falsifier.llm.prompts.published import as_point, as_values
 from falsifier.llm.prompts.view import View
 from falsifier.testing import FREE, START, lag_problem
@@ -51,9 +53,18 @@ def test_in_brief_a_signal_of_many_pieces_is_only_described() -> None:
     assert "[[0, 0], [2.5, 1], [2.75, 0]" in as_signals(VIEW, made)[0]
 
 
-@given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6))
+@given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e6))
 def test_printed_bounds_lie_inside_the_range(low: float, width: float) -> None:
     for digits in (7, 10):
-        if width > 1e-5 * abs(low):
+        if low < low + width:
             printed_low, printed_high = (float(text) for text in bounds(low, low + width, digits))
             assert low <= printed_low <= printed_high <= low + width
+
+
+def test_values_of_a_narrow_range_are_told_apart() -> None:
+    assert bounds(1000000.0001, 1000000.0009, 7) == ("1000000.0001", "1000000.0009")
+    signal = Signal((0.0, 4.0), (1e12 + 0.25, 1e12), "constant")
+    assert signal_text(signal, stop_time=10.0).endswith("[[0, 1000000000000.25], [4, 1000000000000]]")
+    assert (
+        signal_text(replace(signal, values=(1e12 + 0.25,) * 2), stop_time=10.0) == "constant 1000000000000.25"
+    )

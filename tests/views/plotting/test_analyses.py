@@ -72,6 +72,15 @@ def test_red_is_what_was_never_tried() -> None:
     assert [NEVER in colours(picture) for picture in pictures] == [True, False]
 
 
+def test_items_with_numbers_far_apart_are_drawn_side_by_side() -> None:
+    items = (("init", 1), ("run", 2), ("error", 255))
+    modes = Range(name="u", low=1, high=255, kind="enumeration", items=items)
+    constant = Candidate({"u": Signal((0.0,), (255.0,), "constant")})
+    ax = plot_coverage(coverage_of(described(modes), [(constant, None)])).axes[0]
+    assert [label.get_text() for label in ax.get_yticklabels()] == ["init", "run", "error"]
+    assert ax.get_ylim() == (-0.5, 2.5)
+
+
 def test_two_coordinates_are_a_map_whose_boundary_lies_where_the_violation_ends() -> None:
     # x(10) is u, nearly: it violates where u is above 0.5.
     lag = lag_problem("G[10,10] (x <= 0.5)", free=Freedom(5, 0.1), parameters=[START])

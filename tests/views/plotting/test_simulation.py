@@ -3,6 +3,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -202,6 +203,20 @@ def test_of_several_limits_the_one_with_the_small_margin_is_enlarged() -> None:
     assert (
         not plot_evaluation(on_limit, evaluate(on_limit, on_limit.space.decode([0.0] * 4))).axes[0].child_axes
     )
+
+
+def test_what_is_enlarged_shows_the_margin_and_times_that_can_be_read() -> None:
+    slow = lag_problem("G (x <= 399.99)", response=lambda t, *_: {"x": 400.0 * (1.0 - np.exp(-t / 2e-6))})
+    experiment = replace(slow.experiment, stop_time=2e-3, output_interval=1e-7)
+    problem = replace(slow, space=replace(slow.space, stop_time=2e-3), experiment=experiment)
+    figure = plot_evaluation(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
+    (inside,) = figure.axes[0].child_axes
+    low, high = inside.get_ylim()
+    assert high - low < 1.0, "400 V before the marked time hide no margin of 0.01"
+    figure.draw_without_rendering()
+    boxes = [label.get_window_extent() for label in inside.get_xticklabels() if label.get_text()]
+    assert len(boxes) > 1
+    assert all(a.x1 < b.x0 for a, b in pairwise(sorted(boxes, key=lambda box: float(box.x0))))
 
 
 def test_nothing_is_said_of_a_home_that_cannot_be_written() -> None:

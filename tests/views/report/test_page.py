@@ -13,12 +13,13 @@ import pytest
 
 from falsifier.campaigns.analysis import load, load_run
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.signals import Signal
 from falsifier.core.words import signal_text
 from falsifier.record.run import falsify
 from falsifier.testing import START, lag_problem
 from falsifier.views.report import html_report
-from falsifier.views.report.wording import input_table
+from falsifier.views.report.wording import input_table, parameter_facts
 from tests.pages import content, every, parse
 from tests.problems import easy, hard
 from tests.searches import Wrapped
@@ -116,9 +117,14 @@ def test_inputs_are_a_table_of_their_control_points(tmp_path: Path) -> None:
 
 def test_numbers_to_enter_are_not_rounded_to_six_digits() -> None:
     u = Signal((0.0, 43215.25), (2147483647.0, 1 / 3), "constant")
-    run = SimpleNamespace(manifest=SimpleNamespace(stop_time=43216.0))
-    shown = SimpleNamespace(candidate=Candidate({"u": u}), units={}, run=run)
+    narrow = ParameterRange("mass", 1e12, 1e12 + 1.0)
+    manifest = SimpleNamespace(
+        stop_time=43216.0, inputs=(InputRange("u", 0.0, 2147483647.0),), parameters=(narrow,)
+    )
+    candidate = Candidate({"u": u}, {"mass": 1e12 + 0.25})
+    shown = SimpleNamespace(candidate=candidate, units={}, run=SimpleNamespace(manifest=manifest))
     assert input_table(shown).rows == (("0", "2147483647"), ("43215.25", "0.3333333333"))  # type: ignore[arg-type]
+    assert parameter_facts(shown) == [("mass", "1000000000000.25")]  # type: ignore[arg-type]
     assert signal_text(Signal((0.0,), (2147483647.0,))) == "constant 2147483647"
 
 
