@@ -52,7 +52,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
     is_table = place is not None and place.suffix.lower() == ".csv"
     stored = Candidate({}) if place is None or is_table else recorded_inputs(place, source.name)
     problem = load_source(source, searches=False)
-    for note in rights_notes(problem.model):
+    for note in (*problem.info.notes, *rights_notes(problem.model)):
         warn(note)
     with closing(problem.model):
         inputs = {v.name for v in problem.info.inputs}

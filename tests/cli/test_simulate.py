@@ -45,6 +45,11 @@ def test_values_beyond_the_models_limits_are_simulated_and_drawn(tmp_path: Path)
     assert (tmp_path / "out" / "trajectory.png").is_file()
 
 
+def test_notes_on_the_model_are_told_as_by_run(tmp_path: Path) -> None:
+    done = falsifier("simulate", str(fixture("LateStart_2")), "--stl", "y <= 3", cwd=tmp_path)
+    assert "the default experiment starts at 5 s; here simulations start at 0 s" in done.err
+
+
 def test_a_value_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> None:
     old, new = b'unit="m" start="1.0"', b'unit="K" displayUnit="degC" start="293.15"'
     ball = altered(fixture("Ball_2"), tmp_path / "ball.fmu", lambda text: text.replace(old, new))
