@@ -13,7 +13,7 @@ from falsifier.problem.loading import note_named
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import environment
 from falsifier.search.budget import Budget
-from falsifier.search.make_engines import note_llm, price_of
+from falsifier.search.make_engines import note_llm
 from falsifier.search.request import LLMSettings
 
 PAID = LLMSettings(name="openai/m")
@@ -52,14 +52,6 @@ def test_an_unknown_price_is_not_zero() -> None:
     assert most is not None and most.cost is None and "the price is unknown" in most.text
     free = ceiling(asked(PAID), lambda llm: Price(0.0, 0.0))
     assert free is not None and free.cost == 0 and "free of charge" in free.text
-
-
-def test_the_listed_price_is_not_that_of_another_server() -> None:
-    listed = LLMSettings(name="openai/gpt-5-mini")
-    elsewhere = listed.model_copy(update={"api_base": "http://127.0.0.1:9"})
-    assert price_of(listed) is not None
-    assert price_of(elsewhere) is None
-    assert price_of(elsewhere.model_copy(update={"price": (1.0, 2.0)})) == Price(1.0, 2.0)
 
 
 @pytest.mark.parametrize(

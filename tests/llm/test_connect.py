@@ -11,6 +11,7 @@ from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, Message, Usage
 from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
 from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.usage import Price
 from falsifier.search.make_engines import open_chat, price_of
 from falsifier.search.request import LLMSettings
 from tests.llm.server import Step, serving
@@ -237,6 +238,7 @@ def test_an_address_of_the_environment_is_recorded_and_priced(monkeypatch: pytes
     monkeypatch.setenv("OPENAI_API_BASE", "http://127.0.0.1:1/v1")
     there = LLMSettings(name="openai/gpt-5-mini")
     assert there.api_base == "http://127.0.0.1:1/v1" and price_of(there) is None
+    assert price_of(there.model_copy(update={"price": (1.0, 2.0)})) == Price(1.0, 2.0)
     assert LLMSettings.model_validate_json(own.model_dump_json()) == own  # what was recorded stays
     with pytest.raises(ChatSetupError, match=r"names http://127\.0\.0\.1:1/v1 now: unset OPENAI_BASE_URL"):
         open_chat(own)
