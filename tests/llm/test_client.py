@@ -17,7 +17,7 @@ from falsifier.llm.json_text import schema_of_object
 from falsifier.llm.messages import ChatRequest, Message, Usage
 from falsifier.llm.providers import first_mode
 from falsifier.llm.usage import Price, count_tokens
-from tests.llm.server import Server, Step, serving
+from tests.llm.server import Step, serving
 
 SCHEMA = schema_of_object(rationale={"type": "string"})
 STRICT = {"type": "json_schema", "json_schema": {"name": "reply", "strict": True, "schema": SCHEMA}}
@@ -117,7 +117,9 @@ WIRES = [
 @pytest.mark.parametrize("wire", WIRES, ids=lambda w: w.model)
 def test_what_is_sent(wire: Wire) -> None:
     with serving(Step("an answer")) as server:
-        reply = chat_for(wire, server).send(REQUEST)
+        base, mode = server.url if wire.base else server.root, first_mode(wire.model)
+        chat = LiteLLMChat(wire.model, effort="low", api_base=base, options=wire.options, mode=mode)
+        reply = chat.send(REQUEST)
     (received,) = server.received
     assert reply.text == "an answer"
     assert received.path == wire.path
@@ -129,12 +131,6 @@ def test_what_is_sent(wire: Wire) -> None:
     assert (reply.usage.prompt_tokens, reply.usage.completion_tokens) == (100, 20)
     # What every request has whose reply is limited and whose connection can be cut.
     assert received.headers["accept-encoding"] == "identity"
-
-
-def chat_for(wire: Wire, server: Server) -> LiteLLMChat:
-    base = server.url if wire.base else server.root
-    mode = first_mode(wire.model)
-    return LiteLLMChat(wire.model, effort="low", api_base=base, options=wire.options, mode=mode)
 
 
 @pytest.mark.usefixtures("keys")
