@@ -34,8 +34,8 @@ KEYS = {
 }
 
 
-@pytest.fixture
-def keys(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(autouse=True)
+def _keys(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in KEYS.items():
         monkeypatch.setenv(name, value)
 
@@ -113,7 +113,6 @@ WIRES = [
 ]
 
 
-@pytest.mark.usefixtures("keys")
 @pytest.mark.parametrize("wire", WIRES, ids=lambda w: w.model)
 def test_what_is_sent(wire: Wire) -> None:
     with serving(Step("an answer")) as server:
@@ -133,7 +132,6 @@ def test_what_is_sent(wire: Wire) -> None:
     assert received.headers["accept-encoding"] == "identity"
 
 
-@pytest.mark.usefixtures("keys")
 def test_effective_parameters_name_what_was_dropped() -> None:
     warm = {"temperature": 0.5}
     with serving(Step("a"), Step("b")) as server:
@@ -160,7 +158,6 @@ def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
     assert priced.usage.cost == pytest.approx((100 * 0.25 + 20 * 2.0) / 1e6)
 
 
-@pytest.mark.usefixtures("keys")
 def test_reasoning_and_refusals_are_told_apart() -> None:
     refusal = Step(None, extra={"refusal": "I would rather not"})
     counts: dict[str, Any] = {"prompt_tokens": 100, "completion_tokens": 20}
@@ -239,7 +236,6 @@ def test_an_answer_that_cannot_be_used_is_counted(raw: str, count: int) -> None:
     assert lost.without_reply == count and bool(lost.prompt_tokens) == bool(lost.cost) == bool(count)
 
 
-@pytest.mark.usefixtures("keys")
 def test_without_time_nothing_is_sent_and_the_server_is_not_blamed() -> None:
     with serving(Step("{}")) as server:
         with pytest.raises(ChatError, match="nothing was sent: the time limit ended"):
@@ -260,7 +256,6 @@ FAILURES: list[tuple[Step, type[ChatError] | None, str]] = [
 ]
 
 
-@pytest.mark.usefixtures("keys")
 @pytest.mark.parametrize("model", ["openai/mine", "hosted_vllm/mine", "huggingface/org/mine"])
 @pytest.mark.parametrize(("step", "kind", "said"), FAILURES, ids=lambda v: getattr(v, "status", None) or "")
 def test_one_request_is_one_request(step: Step, kind: type[ChatError] | None, said: str, model: str) -> None:
@@ -344,7 +339,6 @@ KEPT = ChatRequest(
 )
 
 
-@pytest.mark.usefixtures("keys")
 def test_what_the_next_question_begins_with_is_marked_where_a_provider_keeps_nothing_else() -> None:
     with serving(Step("a"), Step("b")) as server:
         LiteLLMChat("anthropic/claude-sonnet-4-5", api_base=server.root).send(KEPT)
