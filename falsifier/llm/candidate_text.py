@@ -68,31 +68,25 @@ def _unrolled(found: Any) -> Any:
     return numbers
 
 
-def _signals_by_name(found: Any, info: ValidationInfo) -> Any:
-    """Convert ``{name: values}`` and [time, value] pairs, which LLMs also write, to the listed form."""
+def _entries(found: Any, info: ValidationInfo) -> Any:
+    """Convert what stands by name, and [time, value] pairs, which LLMs also write, to the listed form."""
     if isinstance(found, dict):
-        found = [{"name": k, **(v if isinstance(v, dict) else {"values": v})} for k, v in found.items()]
-    return [_in_numbers(_pairs_apart(s), info) for s in found] if isinstance(found, list) else found
+        key = "values" if info.field_name == "signals" else "value"
+        found = [{"name": k, **(v if isinstance(v, dict) else {key: v})} for k, v in found.items()]
+    return [_in_numbers(_pairs_apart(each), info) for each in found] if isinstance(found, list) else found
 
 
-def _pairs_apart(signal: Any) -> Any:
-    if not isinstance(signal, dict):
-        return signal
-    signal = _plain_keys(signal)
-    values = signal.get("values", signal.get("points"))
+def _pairs_apart(part: Any) -> Any:
+    if not isinstance(part, dict):
+        return part
+    part = _plain_keys(part)
+    values = part.get("values", part.get("points"))
     if isinstance(values, int | float | str):
-        return {**signal, "values": [values]}
+        return {**part, "values": [values]}
     if isinstance(values, list) and values and all(isinstance(v, list) and len(v) == 2 for v in values):
-        rest = {k: v for k, v in signal.items() if k != "points"}
+        rest = {k: v for k, v in part.items() if k != "points"}
         return {**rest, "times": [t for t, _ in values], "values": [v for _, v in values]}
-    return signal
-
-
-def _parameters_by_name(found: Any, info: ValidationInfo) -> Any:
-    if isinstance(found, dict):
-        found = [{"name": k, "value": v} for k, v in found.items()]
-    plain = [_plain_keys(p) if isinstance(p, dict) else p for p in found] if isinstance(found, list) else []
-    return [_in_numbers(p, info) for p in plain] if isinstance(found, list) else found
+    return part
 
 
 def _in_numbers(part: Any, info: ValidationInfo) -> Any:
@@ -156,10 +150,10 @@ class WrittenCandidate(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False, defer_build=True)
 
     rationale: Annotated[str, BeforeValidator(lambda found: found or ""), AfterValidator(_storable)] = ""
-    signals: Annotated[list[WrittenSignal], FailFast(), BeforeValidator(_signals_by_name)] = Field(
+    signals: Annotated[list[WrittenSignal], FailFast(), BeforeValidator(_entries)] = Field(
         default_factory=list
     )
-    parameters: Annotated[list[WrittenParameter], FailFast(), BeforeValidator(_parameters_by_name)] = Field(
+    parameters: Annotated[list[WrittenParameter], FailFast(), BeforeValidator(_entries)] = Field(
         default_factory=list
     )
     point: Annotated[list[_NumberOrTruth] | None, FailFast(), BeforeValidator(_unrolled)] = None
@@ -207,9 +201,7 @@ def _plain_keys(found: dict[str, Any]) -> dict[str, Any]:
     return {names.get(key, str(key)): value for key, value in found.items()}
 
 
-def written_candidate(
-    found: dict[str, Any], words: Mapping[str, Mapping[str, float]] = MappingProxyType({})
-) -> WrittenCandidate:
+def written_candidate(found: dict[str, Any], words: Mapping[str, Mapping[str, float]]) -> WrittenCandidate:
     """Read one candidate; RejectedReplyError stating what is wrong first.
 
     Words stand for numbers, by the name of an input or parameter.

@@ -10,7 +10,7 @@ from falsifier.analyses.coverage import FAST, PACES, SLOW, Coverage, ModeCoverag
 from falsifier.analyses.formalize import Difference, Formalized, Reading
 from falsifier.core.literals import one_line
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import aligned, counted, ends, listed, readable, with_unit
+from falsifier.core.words import aligned, counted, ends, first_few, listed, readable, with_unit
 from falsifier.stl.margins import margin_words, signed
 from falsifier.views.text import Fact, llm_use
 
@@ -142,17 +142,12 @@ def _pair_rows(pairs: Iterable[PairCoverage]) -> Iterator[tuple[str, str]]:
 
 
 def _mode_row(mode: ModeCoverage) -> tuple[str, str]:
-    text = _cut(mode.seen) or "nothing recorded"
+    text = first_few(mode.seen, _SHOWN) or "nothing recorded"
     if mode.changes:
-        text += f"; changes {_cut([f'{before} to {after}' for before, after in mode.changes])}"
+        text += f"; changes {first_few([f'{before} to {after}' for before, after in mode.changes], _SHOWN)}"
     elif mode.seen:
         text += "; no changes"
-    return mode.name, text + (f"; never {_cut(mode.never)}" if mode.never else "")
-
-
-def _cut(entries: Sequence[str]) -> str:
-    more = [f"{len(entries) - _SHOWN} more"] if len(entries) > _SHOWN else []
-    return ", ".join([*entries[:_SHOWN], *more])
+    return mode.name, text + (f"; never {first_few(mode.never, _SHOWN)}" if mode.never else "")
 
 
 def formalized_text(found: Formalized) -> str:

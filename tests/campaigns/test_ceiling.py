@@ -9,10 +9,11 @@ from falsifier.campaigns.runner import check_request, resume_campaign, run_campa
 from falsifier.errors import SpecError
 from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
+from falsifier.problem.loading import note_named
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import environment
 from falsifier.search.budget import Budget
-from falsifier.search.make_engines import note_llm, price_of
+from falsifier.search.make_engines import note_llm
 from falsifier.search.request import LLMSettings
 
 PAID = LLMSettings(name="openai/m")
@@ -53,14 +54,6 @@ def test_an_unknown_price_is_not_zero() -> None:
     assert free is not None and free.cost == 0 and "free of charge" in free.text
 
 
-def test_the_listed_price_is_not_that_of_another_server() -> None:
-    listed = LLMSettings(name="openai/gpt-5-mini")
-    elsewhere = listed.model_copy(update={"api_base": "http://127.0.0.1:9"})
-    assert price_of(listed) is not None
-    assert price_of(elsewhere) is None
-    assert price_of(elsewhere.model_copy(update={"price": (1.0, 2.0)})) == Price(1.0, 2.0)
-
-
 @pytest.mark.parametrize(
     "limits", [{"cost": 0.5}, {"limits": Budget(None, cost=0.5)}, {"cost": 0.5, "limits": Budget(9)}]
 )
@@ -77,5 +70,6 @@ def test_a_resumed_campaign_is_not_given_a_limit_that_cannot_hold(tmp_path: Path
     record = CampaignRecord(**environment(), request=asked(unknown), hashes={})
     write_campaign(tmp_path, record)
     note_llm(unknown)
+    note_named(*TARGET)
     with pytest.raises(SpecError, match="the price of hosted_vllm/x is unknown"):
         resume_campaign(tmp_path, limits=Budget(None, cost=0.5))

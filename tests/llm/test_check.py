@@ -6,9 +6,8 @@ import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.check import Feature, check_chat
-from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.client import connect
 from falsifier.llm.messages import Usage
-from falsifier.llm.providers import first_mode
 from tests.llm.server import Step, serving
 
 GOOD = Step(json.dumps({"values": [1, 2, 3], "rationale": "they sum to 6"}))
@@ -18,10 +17,7 @@ REFUSED = Step(status=400, message="response_format is not supported")
 
 def checked(*steps: Step, effort: str | None = None) -> tuple[dict[str, Feature], Usage]:
     with serving(*steps) as server:
-        chat = LiteLLMChat(
-            "openai/mine", effort=effort, api_base=server.url, mode=first_mode("openai/mine"), attempts=1
-        )
-        features, usage = check_chat(chat)
+        features, usage = check_chat(connect("openai/mine", effort=effort, api_base=server.url, attempts=1))
     return {f.name: f for f in features}, usage
 
 

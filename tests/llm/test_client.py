@@ -17,7 +17,7 @@ from falsifier.llm.json_text import schema_of_object
 from falsifier.llm.messages import ChatRequest, Message, Usage
 from falsifier.llm.providers import first_mode
 from falsifier.llm.usage import Price, count_tokens
-from tests.llm.server import Server, Step, serving
+from tests.llm.server import Step, serving
 
 SCHEMA = schema_of_object(rationale={"type": "string"})
 STRICT = {"type": "json_schema", "json_schema": {"name": "reply", "strict": True, "schema": SCHEMA}}
@@ -34,8 +34,8 @@ KEYS = {
 }
 
 
-@pytest.fixture
-def keys(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(autouse=True)
+def _keys(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in KEYS.items():
         monkeypatch.setenv(name, value)
 
@@ -59,22 +59,17 @@ WIRES = [
         "openai/gpt-5-mini",
         {"model": "gpt-5-mini", "reasoning_effort": "low", "response_format": STRICT},
         header=("authorization", "Bearer sk-openai-secret"),
-        absent=("temperature", "max_retries"),
+        absent=("temperature",),
         options={"temperature": 0.5},
     ),
-    Wire("hosted_vllm/openai/gpt-oss-20b", GPT_OSS, header=None, absent=("max_retries",)),
-    Wire(
-        "huggingface/openai/gpt-oss-20b",
-        GPT_OSS,
-        header=("authorization", "Bearer hf_secret_token"),
-        absent=("max_retries",),
-    ),
+    Wire("hosted_vllm/openai/gpt-oss-20b", GPT_OSS, header=None),
+    Wire("huggingface/openai/gpt-oss-20b", GPT_OSS, header=("authorization", "Bearer hf_secret_token")),
     Wire(
         "ollama_chat/gpt-oss:20b",
         {"model": "gpt-oss:20b", "think": "low", "options": {"num_ctx": 32_768}},
         path="/api/chat",
         header=None,
-        absent=("format", "max_retries"),
+        absent=("format",),
         base="",
     ),
     Wire(
@@ -88,7 +83,7 @@ WIRES = [
     Wire(
         "lm_studio/gpt-oss-20b",
         {"model": "gpt-oss-20b", "reasoning_effort": "low"},
-        absent=("response_format", "max_retries"),
+        absent=("response_format",),
     ),
     Wire("lm_studio/qwen", {"model": "qwen", "response_format": STRICT}),
     Wire("llamafile/any", {"model": "any", "response_format": STRICT}, absent=("reasoning_effort",)),
@@ -113,16 +108,17 @@ WIRES = [
 ]
 
 
-@pytest.mark.usefixtures("keys")
 @pytest.mark.parametrize("wire", WIRES, ids=lambda w: w.model)
 def test_what_is_sent(wire: Wire) -> None:
     with serving(Step("an answer")) as server:
-        reply = chat_for(wire, server).send(REQUEST)
+        base, mode = server.url if wire.base else server.root, first_mode(wire.model)
+        chat = LiteLLMChat(wire.model, effort="low", api_base=base, options=wire.options, mode=mode)
+        reply = chat.send(REQUEST)
     (received,) = server.received
     assert reply.text == "an answer"
     assert received.path == wire.path
     assert {k: received.body.get(k) for k in wire.body} == wire.body
-    assert not set(wire.absent) & received.body.keys()
+    assert not {*wire.absent, "max_retries"} & received.body.keys()
     assert "question" in str(received.body) and "standing" in str(received.body)
     if wire.header is not None:
         assert received.headers[wire.header[0]] == wire.header[1]
@@ -131,13 +127,6 @@ def test_what_is_sent(wire: Wire) -> None:
     assert received.headers["accept-encoding"] == "identity"
 
 
-def chat_for(wire: Wire, server: Server) -> LiteLLMChat:
-    base = server.url if wire.base else server.root
-    mode = first_mode(wire.model)
-    return LiteLLMChat(wire.model, effort="low", api_base=base, options=wire.options, mode=mode)
-
-
-@pytest.mark.usefixtures("keys")
 def test_effective_parameters_name_what_was_dropped() -> None:
     warm = {"temperature": 0.5}
     with serving(Step("a"), Step("b")) as server:
@@ -164,7 +153,6 @@ def test_cost_of_another_server_is_unknown_and_of_a_local_one_nothing() -> None:
     assert priced.usage.cost == pytest.approx((100 * 0.25 + 20 * 2.0) / 1e6)
 
 
-@pytest.mark.usefixtures("keys")
 def test_reasoning_and_refusals_are_told_apart() -> None:
     refusal = Step(None, extra={"refusal": "I would rather not"})
     counts: dict[str, Any] = {"prompt_tokens": 100, "completion_tokens": 20}
@@ -243,7 +231,6 @@ def test_an_answer_that_cannot_be_used_is_counted(raw: str, count: int) -> None:
     assert lost.without_reply == count and bool(lost.prompt_tokens) == bool(lost.cost) == bool(count)
 
 
-@pytest.mark.usefixtures("keys")
 def test_without_time_nothing_is_sent_and_the_server_is_not_blamed() -> None:
     with serving(Step("{}")) as server:
         with pytest.raises(ChatError, match="nothing was sent: the time limit ended"):
@@ -264,7 +251,6 @@ FAILURES: list[tuple[Step, type[ChatError] | None, str]] = [
 ]
 
 
-@pytest.mark.usefixtures("keys")
 @pytest.mark.parametrize("model", ["openai/mine", "hosted_vllm/mine", "huggingface/org/mine"])
 @pytest.mark.parametrize(("step", "kind", "said"), FAILURES, ids=lambda v: getattr(v, "status", None) or "")
 def test_one_request_is_one_request(step: Step, kind: type[ChatError] | None, said: str, model: str) -> None:
@@ -348,7 +334,6 @@ KEPT = ChatRequest(
 )
 
 
-@pytest.mark.usefixtures("keys")
 def test_what_the_next_question_begins_with_is_marked_where_a_provider_keeps_nothing_else() -> None:
     with serving(Step("a"), Step("b")) as server:
         LiteLLMChat("anthropic/claude-sonnet-4-5", api_base=server.root).send(KEPT)

@@ -9,18 +9,13 @@ from falsifier.llm import litellm_adapter
 from falsifier.llm.client import LiteLLMChat, connect, preflight
 from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, Message, Usage
-from falsifier.llm.providers import NO_KEY, PROVIDERS, find_key, first_mode, known, server_address
+from falsifier.llm.providers import NO_KEY, find_key, first_mode, known, server_address
 from falsifier.llm.scripted import ScriptedChat
+from falsifier.llm.usage import Price
 from falsifier.search.make_engines import open_chat, price_of
 from falsifier.search.request import LLMSettings
 from tests.llm.server import Step, serving
 from tests.llm.support import PLAIN, Served
-
-
-@pytest.fixture(autouse=True)
-def _no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in (n for p in PROVIDERS.values() for n in p.keys):
-        monkeypatch.delenv(name, raising=False)
 
 
 @pytest.mark.parametrize(
@@ -115,23 +110,23 @@ def test_a_server_is_where_it_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> 
 
 
 @pytest.mark.parametrize(
-    ("llm", "variable", "value", "address"),
+    ("llm", "address"),
     [
-        ("lm_studio/x", "UNUSED", "", "http://localhost:1234/v1"),
-        ("llamafile/x", "UNUSED", "", "http://127.0.0.1:8080/v1"),
-        ("ollama_chat/x", "UNUSED", "", "http://localhost:11434"),
-        ("hosted_vllm/x", "HOSTED_VLLM_API_BASE", "http://127.0.0.1:9/v1", "http://127.0.0.1:9/v1"),
+        ("lm_studio/x", "http://localhost:1234/v1"),
+        ("llamafile/x", "http://127.0.0.1:8080/v1"),
+        ("ollama_chat/x", "http://localhost:11434"),
+        ("hosted_vllm/x", "http://127.0.0.1:9/v1"),
     ],
 )
 def test_prompts_are_sent_to_the_server_that_is_meant(
-    llm: str, variable: str, value: str, address: str, monkeypatch: pytest.MonkeyPatch
+    llm: str, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def sent(llm: str, **arguments: object) -> None:
         raise ConnectionError(f"to {arguments['api_base']}")
 
     for name in ("LM_STUDIO_API_BASE", "LLAMAFILE_API_BASE", "OLLAMA_API_BASE"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setenv(variable, value)
+    monkeypatch.setenv("HOSTED_VLLM_API_BASE", "http://127.0.0.1:9/v1")
     monkeypatch.setattr(litellm_adapter, "completed", sent)
     with pytest.raises(ChatError, match=f"^{llm} at {address}: .*to {address}$"):
         connect(llm, attempts=1).send(PLAIN)  # type: ignore[attr-defined]
@@ -180,8 +175,7 @@ def test_a_server_of_ones_own_needs_no_key(llm: str, monkeypatch: pytest.MonkeyP
     assert [list(r.headers.values()).count("account") for r in server.received] == [0, 3]
 
 
-def test_a_missing_key_that_only_litellm_misses_is_told_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv("FIREWORKS_API_KEY", raising=False)
+def test_a_missing_key_that_only_litellm_misses_is_told_at_once() -> None:
     with pytest.raises(ChatError, match=r"^nvidia_nim/x: no API key: set NVIDIA_NIM_API_KEY in the env"):
         connect("nvidia_nim/x").complete(PLAIN)
     with pytest.raises(ChatError, match=r"^fireworks_ai/x: FIREWORKS_API_KEY is not set"):
@@ -237,6 +231,7 @@ def test_an_address_of_the_environment_is_recorded_and_priced(monkeypatch: pytes
     monkeypatch.setenv("OPENAI_API_BASE", "http://127.0.0.1:1/v1")
     there = LLMSettings(name="openai/gpt-5-mini")
     assert there.api_base == "http://127.0.0.1:1/v1" and price_of(there) is None
+    assert price_of(there.model_copy(update={"price": (1.0, 2.0)})) == Price(1.0, 2.0)
     assert LLMSettings.model_validate_json(own.model_dump_json()) == own  # what was recorded stays
     with pytest.raises(ChatSetupError, match=r"names http://127\.0\.0\.1:1/v1 now: unset OPENAI_BASE_URL"):
         open_chat(own)

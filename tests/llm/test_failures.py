@@ -100,11 +100,8 @@ def test_where_there_is_no_account_none_is_to_be_checked() -> None:
     assert str(caught.value).endswith("check the LLM's name and the server's address. model 'm' not found")
 
 
-REFUSED = ConnectionRefusedError(111, "Connection refused")
-
-
 def test_servers_elsewhere_that_refuse_are_waited_for() -> None:
-    error = told(REFUSED, "openai/m", "http://elsewhere.example/v1")
+    error = told(ConnectionRefusedError(111, "Connection refused"), "openai/m", "http://elsewhere.example/v1")
     assert isinstance(error, TransientChatError) and error.patience is None
 
 

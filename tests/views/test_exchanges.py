@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.llm.messages import ChatReply, ChatRequest, Usage
+from falsifier.llm.messages import ChatReply, Usage
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.record.run import falsify
 from falsifier.views.exchanges import exchanges_html
@@ -17,25 +17,20 @@ EVIL = "<script>alert(1)</script>"
 NAME = impossible().name
 
 
-def script(request: ChatRequest) -> ChatReply:
-    """Answer with a constant input; the second reply is useless, and one rationale is an attack."""
-    script_.append(len(request.messages))
-    level = 0.01 * len(script_)
-    signals = [{"name": "u", "interpolation": "constant", "times": [0], "values": [level]}]
-    reply = json.dumps({"rationale": f"{EVIL} answer {len(script_)}", "signals": signals})
-    text = "no idea" if len(script_) == 2 else reply
-    return ChatReply(text=text, seconds=1.5, usage=Usage(prompt_tokens=700, completion_tokens=50, cost=0.0))
-
-
-script_: list[int] = []
+def chat() -> ScriptedChat:
+    """Answers with constant inputs; the second reply is useless, and the rationales are attacks."""
+    signals = ([{"name": "u", "values": [0.01 * n]}] for n in range(1, 8))
+    texts = [json.dumps({"rationale": f"{EVIL} answer {n}", "signals": s}) for n, s in enumerate(signals, 1)]
+    texts[1] = "no idea"
+    usage = Usage(prompt_tokens=700, completion_tokens=50, cost=0.0)
+    return ScriptedChat(ChatReply(text=text, seconds=1.5, usage=usage) for text in texts)
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Six samples of a model, the second after a rejected reply."""
     directory = tmp_path_factory.mktemp("asked") / "run"
-    script_.clear()  # a worker that comes back to this module makes the run again
-    falsify(impossible(), llm=ScriptedChat(script), budget=6, directory=directory)
+    falsify(impossible(), llm=chat(), budget=6, directory=directory)
     return directory
 
 
@@ -62,7 +57,7 @@ def test_the_report_and_a_notebook_show_them(run: Path) -> None:
     assert "What was asked, and what came of it" in page
     assert page.count('class="exchange"') == 6
     assert "questions included" in page
-    result = falsify(impossible(), llm=ScriptedChat(script), budget=2, directory=run.parent / "second")
+    result = falsify(impossible(), llm=chat(), budget=2, directory=run.parent / "second")
     assert result_html(result).count('class="exchange"') == 2
 
 

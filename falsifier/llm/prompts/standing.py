@@ -228,14 +228,10 @@ def _freedom(view: View) -> Iterator[str]:
         if r.free is not None:
             groups.setdefault((r.free, r.kind != "real"), []).append(r.name)
     for (free, is_discrete), names in groups.items():
-        what = (
-            "number and times"
-            if is_discrete
-            else "number, times and interpolation (pchip, linear or constant)"
-        )
+        what = ["number", "times"] + ["interpolation (pchip, linear or constant)"] * (not is_discrete)
         whose = "" if len(view.space.inputs) == 1 else f" of {listed(names)}"
         yield (
-            f"Alternatively, choose {what} of the control points{whose} yourself: at most "
+            f"Alternatively, choose {listed(what)} of the control points{whose} yourself: at most "
             f"{free.max_control_points}{' each' * (len(names) > 1)}, at least {free.min_interval:g} s apart"
         )
 

@@ -132,9 +132,8 @@ def _quantity(
         Bound(str(p), begin, min(finish, end), _evaluated(compared_sides(p)[1], trajectory))
         for p, (begin, finish) in judged
     )
-    decided = (
-        verdict.critical_time if verdict and any(str(p) == verdict.predicate for p, _ in judged) else None
-    )
+    predicates = {bound.predicate for bound in bounds}
+    decided = verdict.critical_time if verdict and verdict.predicate in predicates else None
     shortfalls = verdict.breach.shortfalls if verdict and verdict.breach else ()
     own = [shortfall for shortfall in shortfalls if shortfall.quantity == str(expression)]
     return Panel(

@@ -82,20 +82,13 @@ def plot_evaluation(problem: Problem, evaluation: Evaluation) -> "Figure":
 
 
 def _panels(problem: Problem, evaluation: Evaluation) -> tuple[list[Panel], Verdict]:
-    if evaluation.trajectory is None or evaluation.verdict is None:
+    trajectory, verdict, candidate = evaluation.trajectory, evaluation.verdict, evaluation.candidate
+    if trajectory is None or verdict is None:
         raise ValueError("nothing to plot: the simulation failed, or its trajectory was not kept")
-    variables = (v for v in problem.info.variables if v.kind in ("integer", "boolean", "enumeration"))
+    formula, inputs, info = problem.requirement.formula, problem.space.inputs, problem.info
+    variables = (v for v in info.variables if v.kind in ("integer", "boolean", "enumeration"))
     labels = {v.name: number_names(v.kind, v.items) for v in variables}
-    drawn = panels(
-        problem.requirement.formula,
-        evaluation.trajectory,
-        evaluation.candidate,
-        problem.space.inputs,
-        evaluation.verdict,
-        labels,
-        problem.info.components,
-    )
-    return drawn, evaluation.verdict
+    return panels(formula, trajectory, candidate, inputs, verdict, labels, info.components), verdict
 
 
 def plot_panels(drawn: Sequence[Panel], verdict: Verdict | None, title: str = "") -> "Figure":

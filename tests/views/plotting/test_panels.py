@@ -6,18 +6,7 @@ from falsifier.core.signals import Signal
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.stl import parse
 from falsifier.testing import lag_problem
-from falsifier.views.plotting.panels import Panel, judged_windows, panels
-
-STEP = Candidate({"u": Signal((0.0, 4.0), (1.0, 0.0), "constant")})
-
-
-def drawn(formula: str) -> list[Panel]:
-    problem = lag_problem(formula)
-    found = evaluate(problem, STEP)
-    assert found.trajectory is not None
-    return panels(
-        problem.requirement.formula, found.trajectory, STEP, problem.space.inputs, found.verdict, {}
-    )
+from falsifier.views.plotting.panels import judged_windows, panels
 
 
 @pytest.mark.parametrize(
@@ -39,7 +28,11 @@ def test_predicates_count_within_all_windows_around_them(
 
 
 def test_each_compared_quantity_has_a_panel_and_then_each_input() -> None:
-    first, second, last = drawn("G (0.9 >= x) and G[2,4] (x >= 0) and F[0,5] (x - u <= 0)")
+    problem = lag_problem("G (0.9 >= x) and G[2,4] (x >= 0) and F[0,5] (x - u <= 0)")
+    step = Candidate({"u": Signal((0.0, 4.0), (1.0, 0.0), "constant")})
+    formula, found = problem.requirement.formula, evaluate(problem, step)
+    assert found.trajectory is not None
+    first, second, last = panels(formula, found.trajectory, step, problem.space.inputs, found.verdict, {})
     assert [p.title for p in (first, second, last)] == ["x [m]", "x - u", "u [V]"]
     assert [(b.predicate, b.start, b.end) for b in first.bounds] == [
         ("0.9 >= x", 0.0, 10.0),

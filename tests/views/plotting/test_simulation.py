@@ -24,6 +24,11 @@ from tests.problems import conditional, hard, unusable
 from tests.views.plotting.support import simulated, xs, ys
 
 
+def drawn(problem: Problem, level: float = 1.0) -> Figure:
+    """The picture of a simulation with inputs that stay at this level."""
+    return plot_evaluation(problem, evaluate(problem, problem.space.decode([level] * 4)))
+
+
 def test_a_requirement_is_drawn_on_given_axes() -> None:
     evaluation, ax = simulated(), Figure().subplots()
     assert evaluation.verdict is not None
@@ -76,8 +81,7 @@ def test_what_broke_is_marked_and_what_decided_is_only_a_ring() -> None:
 
 
 def test_a_nearest_miss_is_not_drawn_as_a_violation() -> None:
-    problem = lag_problem()
-    figure = plot_evaluation(problem, evaluate(problem, problem.space.decode([0.0] * 4)))
+    figure = drawn(lag_problem(), 0.0)
     assert figure.get_suptitle().startswith("LAG: not violated, robustness +0.9")
     dots = [line for line in figure.axes[0].get_lines() if line.get_marker() == "o"]
     assert [dot.get_color() for dot in dots] == ["#b35900"]
@@ -110,8 +114,7 @@ def test_signals_that_are_not_real_are_drawn_in_steps_with_their_names() -> None
     model = FunctionModel(
         lambda times, *_: {"x": np.ones_like(times)}, replace(problem.info, variables=variables)
     )
-    modes = replace(problem, model=model)
-    figure = plot_evaluation(modes, evaluate(modes, modes.space.decode([1.0] * 4)))
+    figure = drawn(replace(problem, model=model))
     assert [label.get_text() for label in figure.axes[0].get_yticklabels()] == ["Off", "On"]
     assert figure.axes[0].get_lines()[0].get_drawstyle() == "steps-post"
 
@@ -178,8 +181,7 @@ def test_names_that_are_longer_than_a_panel_are_on_several_lines_with_both_ends(
 
 
 def test_a_window_of_one_sample_is_seen() -> None:
-    problem = lag_problem("F[10,10] (x >= 0.5)")
-    output = plot_evaluation(problem, evaluate(problem, problem.space.decode([-1.0] * 4))).axes[0]
+    output = drawn(lag_problem("F[10,10] (x >= 0.5)"), -1.0).axes[0]
     bound = output.get_lines()[1]
     assert (xs(bound).tolist(), bound.get_marker()) == ([10.0], "_")
     assert [patch.get_linewidth() > 0 for patch in output.patches] == [True, True]
@@ -188,28 +190,20 @@ def test_a_window_of_one_sample_is_seen() -> None:
 
 
 def test_limits_that_lie_close_to_each_other_are_named_together() -> None:
-    problem = lag_problem("G (-0.001 <= x <= 0.001 and x <= 0.8)")
-    output = plot_evaluation(problem, evaluate(problem, problem.space.decode([1.0] * 4))).axes[0]
+    output = drawn(lag_problem("G (-0.001 <= x <= 0.001 and x <= 0.8)")).axes[0]
     assert [text.get_text() for text in output.texts] == ["-0.001 <= x, x <= 0.001", "x <= 0.8"]
 
 
 def test_of_several_limits_the_one_with_the_small_margin_is_enlarged() -> None:
-    problem = lag_problem("G (x <= 0.99998 and x >= -1000)")
-    (inside,) = (
-        plot_evaluation(problem, evaluate(problem, problem.space.decode([1.0] * 4))).axes[0].child_axes
-    )
+    (inside,) = drawn(lag_problem("G (x <= 0.99998 and x >= -1000)")).axes[0].child_axes
     assert np.ptp(inside.get_ylim()) < 0.2
-    on_limit = lag_problem("G (x >= 0)")
-    assert (
-        not plot_evaluation(on_limit, evaluate(on_limit, on_limit.space.decode([0.0] * 4))).axes[0].child_axes
-    )
+    assert not drawn(lag_problem("G (x >= 0)"), 0.0).axes[0].child_axes
 
 
 def test_what_is_enlarged_shows_the_margin_and_times_that_can_be_read() -> None:
     slow = lag_problem("G (x <= 399.99)", response=lambda t, *_: {"x": 400.0 * (1.0 - np.exp(-t / 2e-6))})
     experiment = replace(slow.experiment, stop_time=2e-3, output_interval=1e-7)
-    problem = replace(slow, space=replace(slow.space, stop_time=2e-3), experiment=experiment)
-    figure = plot_evaluation(problem, evaluate(problem, problem.space.decode([1.0] * 4)))
+    figure = drawn(replace(slow, space=replace(slow.space, stop_time=2e-3), experiment=experiment))
     (inside,) = figure.axes[0].child_axes
     low, high = inside.get_ylim()
     assert high - low < 1.0, "400 V before the marked time hide no margin of 0.01"
