@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 from falsifier.core.files import absent
 from falsifier.core.literals import number_in
-from falsifier.core.model import Experiment, Model, ModelInfo, whole_steps
+from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo, whole_steps
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import listed, readable
 from falsifier.errors import SpecError, did_you_mean, in_section, naming, setting, written
-from falsifier.fmu import Rights, System, is_package, read_info, read_package, resolved
+from falsifier.fmu import Rights, System, is_package, is_solved, read_info, read_package, resolved
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.models import make_model
 from falsifier.problem.ranges import search_space, string_values, value_kind
@@ -243,9 +243,16 @@ def _notes(
 ) -> Iterator[str]:
     if grid is not None:
         yield f"time grid of {grid.interval:g} s: {grid.reason}"
-    for r in space.inputs:
-        if r.hold is not None and r.hold < (step := experiment.step):
+    step = experiment.step
+    for r in space.inputs if not is_solved(model) else ():
+        times = space.fixed_times(r)[:2]
+        if r.hold is not None and r.hold < step:
             yield f"{r.name}: hold = {readable(r.hold)} s is shorter than the communication step, {step:g} s"
+        elif r.free is None and len(times) > 1 and times[1] < step * (1.0 - GRID_ROUNDING):
+            yield (
+                f"{r.name}: control points {readable(times[1])} s apart are closer than the communication "
+                f"step, {step:g} s, at which the model is given inputs"
+            )
     limits = {r.name: (r.low, r.high) for r in space.ranges}
     yield from unit_notes(model, limits | {name: (value, value) for name, value in fixed.items()})
     yield from rights_notes(model)

@@ -174,6 +174,16 @@ def test_a_hold_that_is_shorter_than_a_step_is_noted() -> None:
     assert note == "throttle: hold = 0.005 s is shorter than the communication step, 0.01 s"
 
 
+@pytest.mark.parametrize(
+    ("points", "interface"), [(10_000, "co-simulation"), (7, "co-simulation"), (10_000, "model-exchange")]
+)
+def test_control_points_that_are_closer_than_steps_are_noted(points: int, interface: str) -> None:
+    model, inputs = SPEC["model"] | {"interface": interface}, {"throttle": {"control_points": points}}
+    joined = join(parse_spec(SPEC | {"model": model, "inputs": inputs}, file="my.toml"), "R", path=FILE)
+    told = [n for n in joined.notes if "s apart are closer than the communication step, 0.01 s" in n]
+    assert len(told) == (points > 7 and interface == "co-simulation"), "a solver sees all of them"
+
+
 def test_a_range_that_may_be_in_the_displayed_unit_is_noted(tmp_path: Path) -> None:
     old, new = b'unit="m" start="1.0"', b'unit="m" displayUnit="mm" start="1.0"'
     ball = altered(fixture("Ball_2"), tmp_path / "ball.fmu", lambda text: text.replace(old, new))
