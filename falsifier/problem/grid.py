@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
 
+from falsifier.core.experiment import common_part, exact
 from falsifier.core.literals import digits
-from falsifier.core.model import common_part, exact
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import FreeSection
 from falsifier.stl import Formula, parse

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from falsifier.core.experiment import Experiment
 from falsifier.core.function_model import FunctionModel
-from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.errors import MonitorError, SimulationError, SpecError
