@@ -17,8 +17,6 @@ GRID_ROUNDING = 1e-6
 # Largest denominator of times like 1/30 s, which are written with many digits.
 _MAX_DENOMINATOR = 100_000
 _ROUNDING = 1e-12
-# Steps of a simulation in s: the program that runs FMUs takes times for equal that are a tenth of this apart.
-_SHORTEST_STEP = 1e-10
 
 
 def exact(seconds: float) -> Fraction:
@@ -92,12 +90,6 @@ class Experiment:
         whole_steps("stop_time", self.stop_time, "output_interval", self.output_interval)
         if self.step_size is not None:
             whole_steps("output_interval", self.output_interval, "step_size", self.step_size)
-        if self.step < _SHORTEST_STEP:
-            name = "step_size" if self.step_size is not None else "output_interval"
-            expected = f"expected {_SHORTEST_STEP:g} s or more, as times a tenth of that apart count as one"
-            raise SpecError(
-                f"{name} = {self.step:g} s: {expected}; use a model whose time has a larger unit", key=name
-            )
 
     @property
     def step(self) -> float:
