@@ -24,7 +24,7 @@ from falsifier.record.journal import repair
 from falsifier.record.manifest import environment
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
-from falsifier.search.make_engines import note_llm
+from falsifier.search.make_engines import check_llm, note_llm
 from falsifier.search.request import LLMSettings
 from falsifier.testing import lag_problem
 from falsifier.views.report import html_report
@@ -59,7 +59,7 @@ def theirs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_a_module_that_only_a_record_names_is_not_imported(theirs: Path) -> None:
     for use in (resume, lambda run: counterexample_case(run).problem()):
-        with pytest.raises(JournalError, match=f"nobody has named it.*{TARGET}"):
+        with pytest.raises(JournalError, match=f"nobody has named on this.*{TARGET}"):
             use(theirs / "run")
     assert not (theirs / "imported").exists()
     load_problem(TARGET)
@@ -74,7 +74,7 @@ def test_a_module_of_the_same_name_in_another_place_is_another_one(
     (theirs / "somebodys_module.py").rename(theirs / "other" / "somebodys_module.py")
     monkeypatch.syspath_prepend(theirs / "other")
     del sys.modules["somebodys_module"]
-    with pytest.raises(JournalError, match="nobody has named it"):
+    with pytest.raises(JournalError, match="nobody has named"):
         resume(theirs / "run")
 
 
@@ -110,6 +110,28 @@ def test_nor_is_that_of_a_campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     write_campaign(tmp_path / "campaign", record)
     with pytest.raises(ChatSetupError, match=r"llm check openai/x --api-base http://127\.0\.0\.1:9$"):
         resume_campaign(tmp_path / "campaign")
+
+
+def test_a_server_that_the_environment_named_for_a_run_is_asked_without_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("OPENAI_API_BASE", "http://127.0.0.1:9")
+    named = LLMSettings(name="openai/x")
+    note_llm(named)
+    monkeypatch.delenv("OPENAI_API_BASE")
+    assert not named.is_usual
+    check_llm(tmp_path, named)
+
+
+def test_where_nothing_can_be_noted_the_message_says_what_to_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", os.devnull)
+    named = LLMSettings(name="openai/x", api_base="http://127.0.0.1:9")
+    note_llm(named)
+    with pytest.raises(ChatSetupError, match=f"noted in {os.devnull}/.*: set XDG_CACHE_HOME if"):
+        check_llm(tmp_path, named)
 
 
 @pytest.mark.parametrize("name", ["openai/gpt-5-mini", "openai/own"])
