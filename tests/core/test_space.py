@@ -300,7 +300,9 @@ def test_a_missing_parameter_has_its_nominal_value_and_needs_one() -> None:
     space = lag_problem(points=1, parameters=[START]).space
     fitted = fit(space, Candidate({"u": Signal((0.0,), (0.5,), "linear")}))
     assert fitted.candidate.parameters == {"x0": 0.0}
-    assert "x0 is not given" in fitted.notes[0]
+    assert "x0 is not given: its nominal value, 0, is used" in fitted.notes[0]
+    exact = replace(space, parameters=(replace(START, nominal=0.123456789),))
+    assert "0.123456789, is used" in fit(exact, Candidate({"u": RAMP})).notes[-1]
     unknown = replace(space, parameters=(replace(START, nominal=None),))
     with pytest.raises(CandidateError, match="'x0' is searched and missing"):
         fit(unknown, Candidate({"u": RAMP}))
