@@ -165,8 +165,9 @@ def archive(save: Callable[..., None] = np.savez, **parts: Any) -> bytes:
         archive(columns=np.zeros((1, 5))),
         archive(times=np.array([object()])),
         archive(np.savez_compressed, columns=np.zeros((1, 1000)), times=np.arange(1000.0)),
+        archive(columns=np.zeros((1, 1000))).replace(b"(1, 1000), }" + 10 * b" ", b"(1, 99999999999999), }"),
     ],
-    ids=["text", "cut off", "too few", "too short", "pickle", "compressed"],
+    ids=["text", "cut off", "too few", "too short", "pickle", "compressed", "huge"],
 )
 def test_a_trajectory_of_any_content_is_one_that_was_not_kept(content: bytes, tmp_path: Path) -> None:
     written(tmp_path, f"trajectories/0-{checksum(content)}.npz")
