@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import sys
 from collections.abc import Callable, Iterator
@@ -11,9 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from falsifier.campaigns import CampaignRequest, cross, resume_campaign
 from falsifier.campaigns.directory import CampaignRecord, write_campaign
+from falsifier.cli import cli
 from falsifier.core.files import checksum, seal
 from falsifier.counterexamples.case import counterexample_case
 from falsifier.counterexamples.store import FILE_NAME, save, to_store
@@ -64,6 +67,29 @@ def test_a_module_that_only_a_record_names_is_not_imported(theirs: Path) -> None
     assert not (theirs / "imported").exists()
     load_problem(TARGET)
     assert resume(theirs / "run")[0].falsified and counterexample_case(theirs / "run").problem()
+
+
+@pytest.mark.usefixtures("at_the_command_line")
+def test_the_command_that_the_refusal_states_names_a_module(theirs: Path) -> None:
+    with pytest.raises(JournalError) as refused:
+        resume(theirs / "run")
+    command = shlex.split(str(refused.value).rpartition("name it first: python -m falsifier ")[2])
+    assert CliRunner().invoke(cli, command).exit_code == 0
+    assert resume(theirs / "run")[0].falsified
+
+
+def test_the_command_that_the_refusal_states_names_a_server(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    with serving() as server:  # its script has no answers, so the check itself fails
+        theirs = LLMSettings(name="openai/x", api_base=server.url, options={"user": "a b", "store": True})
+        with pytest.raises(ChatSetupError) as refused:
+            check_llm(tmp_path, theirs)
+        command = shlex.split(str(refused.value).rpartition("name it first: falsifier ")[2])
+        CliRunner().invoke(cli, command)
+        assert server.received
+    check_llm(tmp_path, theirs)
 
 
 def test_a_module_of_the_same_name_in_another_place_is_another_one(
