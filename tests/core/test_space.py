@@ -290,6 +290,13 @@ def test_a_free_space_takes_as_many_control_points_as_it_allows() -> None:
     assert len(fit(space, Candidate({"u": steps})).candidate.signals["u"].times) == 20
 
 
+def test_control_points_of_nanoseconds_are_not_fixed_ones_because_they_are_near_in_seconds() -> None:
+    fixed = SearchSpace((InputRange("u", 0.0, 1.0, control_points=3, interpolation="linear"),), (), 1e-8)
+    fixed.admit(Candidate({"u": Signal((0.0, 5e-9, 1e-8), (0.0, 1.0, 0.0), "linear")}))
+    with pytest.raises(CandidateError, match=r"one at 5\.5e-09 s instead of 5e-09 s"):
+        fixed.admit(Candidate({"u": Signal((0.0, 5.5e-9, 1e-8), (0.0, 1.0, 0.0), "linear")}))
+
+
 def test_inputs_that_are_not_searched_are_left_out_and_said() -> None:
     fitted = fit(lag_problem().space, Candidate({"u": RAMP, "v": RAMP}))
     assert list(fitted.candidate.signals) == ["u"]
