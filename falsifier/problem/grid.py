@@ -158,14 +158,14 @@ def _text(seconds: Fraction) -> str:
 
 def check_steps(stop_time: float, period: float | None, *, key: str | None = None) -> None:
     """Check a period in s, stated at a key or else the FMU's step; SpecError if it is too short."""
-    smallest = stop_time / MAX_STEPS
+    smallest, shorten = stop_time / MAX_STEPS, "shorten it, or "
     why = f"gives more than {MAX_STEPS:,} steps up to the stop time {stop_time:.10g} s"
     if smallest < _SHORTEST_STEP:
-        smallest = _SHORTEST_STEP
+        smallest, shorten = _SHORTEST_STEP, ""
         why = "is so short that times count as one; use a model whose time has a larger unit"
     if period is not None and period < smallest:
         named = f"{key.rpartition('.')[2]} =" if key else "the FMU's step"
-        remedy = "" if key else "shorten it, or state an output interval: "
+        remedy = "" if key else f"{shorten}state an output interval: "
         raise SpecError(f"{named} {period:g} s {why}; {remedy}the smallest value is {smallest:g}", key=key)
 
 

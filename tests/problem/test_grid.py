@@ -109,6 +109,8 @@ def test_the_shortest_step_is_refused_in_words_and_half_of_it_confirms() -> None
 
     with pytest.raises(SpecError, match=r"output_interval: .* 5e-11 s is so short .* value is 1e-10"):
         problem(5e-11)
+    with pytest.raises(SpecError, match=r"FMU's step 1e-12 s is so .* unit; state an output interval: "):
+        choose_grid(1e-8, fmu_step=1e-12)
     finest = problem(1e-10)
     found = evaluate(finest, finest.space.decode([1.0] * 5))
     assert confirm(finest, found).outcome == "confirmed"
