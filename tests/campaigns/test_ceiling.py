@@ -9,6 +9,7 @@ from falsifier.campaigns.runner import check_request, resume_campaign, run_campa
 from falsifier.errors import SpecError
 from falsifier.llm.prompts import MOST_PROMPT_TOKENS
 from falsifier.llm.usage import Price
+from falsifier.problem.loading import note_named
 from falsifier.problem.source import ProblemSource
 from falsifier.record.manifest import environment
 from falsifier.search.budget import Budget
@@ -77,5 +78,6 @@ def test_a_resumed_campaign_is_not_given_a_limit_that_cannot_hold(tmp_path: Path
     record = CampaignRecord(**environment(), request=asked(unknown), hashes={})
     write_campaign(tmp_path, record)
     note_llm(unknown)
+    note_named(record.request.runs[0].problems[0])
     with pytest.raises(SpecError, match="the price of hosted_vllm/x is unknown"):
         resume_campaign(tmp_path, limits=Budget(None, cost=0.5))
