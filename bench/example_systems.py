@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier import falsify
+from falsifier.core.experiment import Experiment
 from falsifier.core.function_model import FunctionModel
-from falsifier.core.model import Experiment, Kind, ModelInfo, Variable
+from falsifier.core.model import Kind, ModelInfo, Variable
 from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.space import SearchSpace
 from falsifier.problem.problem import Problem

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.compiler import compiler
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel

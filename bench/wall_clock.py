@@ -28,7 +28,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from bench.peers import PEERS, peer_search
 from falsifier import Budget, Problem, falsify, load_problem
-from falsifier.core.model import Experiment, Model, ModelInfo
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import Model, ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.evaluation.confirm import confirm

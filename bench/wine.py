@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import Experiment, Interface
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel, read_info

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable
 from statistics import median
 
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
 from tests.fmu.fixtures import path

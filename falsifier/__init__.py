@@ -66,9 +66,9 @@ if TYPE_CHECKING:
         suite as suite,
     )
     from falsifier.core.candidate import Candidate as Candidate
+    from falsifier.core.experiment import Experiment as Experiment
     from falsifier.core.function_model import FunctionModel as FunctionModel
     from falsifier.core.model import (
-        Experiment as Experiment,
         Model as Model,
         ModelInfo as ModelInfo,
         Variable as Variable,

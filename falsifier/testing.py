@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.experiment import Experiment
 from falsifier.core.function_model import FunctionModel
-from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.ranges import Freedom, InputRange, ParameterRange
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace

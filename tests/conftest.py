@@ -1,8 +1,9 @@
-"""What all tests share: no keys in the environment, no network but this machine's own."""
+"""What all tests share: no keys in the environment, no network but this machine's own, an own cache."""
 
 import os
 import socket
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from falsifier.campaigns import run_campaign
+from falsifier.core.files import cache_directory
 from falsifier.errors import speak_to
 from tests.campaigns.support import request, work_in_threads
 
@@ -48,6 +50,19 @@ def closed_network() -> Any:
         patch.delenv(name)
     yield
     patch.undo()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def own_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Keep the user's cache of falsifier as it is; what takes other tools long to make again is shared."""
+    users, own = cache_directory().parent, tmp_path_factory.mktemp("cache")
+    for name in ("fontconfig", "matplotlib", "pip", "zig"):
+        with suppress(OSError):
+            (users / name).mkdir(parents=True, exist_ok=True)
+        (own / name).symlink_to(users / name)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(own))
+        yield
 
 
 @pytest.fixture

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from falsifier.core.model import Experiment, ModelInfo
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError

@@ -83,10 +83,14 @@ def run_directories(directory: Path) -> list[Path]:
 
 def _known(places: Sequence[Path], remedy: str) -> list[Path]:
     """Return the directories that are runs, and warn of those of which there is only what happened."""
-    found = [place for place in places if holds_run(place)]
-    for journal in (place / JOURNAL for place in places if place not in found):
-        if journal.exists() and journal.stat().st_size:  # made empty before the manifest is written
-            _tell_left_out(journal.parent, remedy)
+    found = []
+    for place in places:
+        if holds_run(place):
+            found.append(place)
+        elif (
+            journal := place / JOURNAL
+        ).exists() and journal.stat().st_size:  # made empty before the manifest
+            _tell_left_out(place, remedy)
     return found
 
 

@@ -14,9 +14,10 @@ from falsifier.cli.options import PATH, changes_in, json_option, out_option, pol
 from falsifier.cli.output import as_shown, say
 from falsifier.context.simulink import read_diagram
 from falsifier.context.values import SIMULINK
+from falsifier.core.experiment import Experiment
 from falsifier.core.files import absent, bundled
 from falsifier.core.literals import shell_word
-from falsifier.core.model import Experiment, ModelInfo
+from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.words import in_unit
 from falsifier.errors import MachineError, ModelError, SpecError

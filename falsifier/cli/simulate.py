@@ -11,9 +11,9 @@ from falsifier.cli.files import draw_evaluation, made_folder, saved
 from falsifier.cli.options import inputs_option, json_option, out_option, problem_source, requirement_options
 from falsifier.cli.output import FAILED, as_shown, conclude
 from falsifier.core.candidate import Candidate
+from falsifier.core.experiment import GRID_ROUNDING
 from falsifier.core.files import write_whole
 from falsifier.core.literals import csv_text, number_in, one_line
-from falsifier.core.model import GRID_ROUNDING
 from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace

@@ -7,6 +7,7 @@ from math import floor
 import numpy as np
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.literals import shortest
 from falsifier.core.ranges import InputRange, Range, is_outside, nearest_value, outside_text
 from falsifier.core.signals import Interpolation, Signal, even_times
 from falsifier.core.space import SearchSpace
@@ -48,7 +49,7 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
         if value is None:
             raise _missing(p)
         if p.name not in candidate.parameters:
-            notes.append(f"{p.name} is not given: its nominal value, {value:g}, is used")
+            notes.append(f"{p.name} is not given: its nominal value, {shortest(value)}, is used")
         notes += _rounded(p, (value,))
         parameters[p.name] = value
     return Fitted(

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.arguments import instance
-from falsifier.core.model import Experiment, ModelInfo, check_finite
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import ModelInfo, check_finite
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SimulationError, did_you_mean

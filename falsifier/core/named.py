@@ -27,5 +27,16 @@ def is_noted(what: str) -> bool:
     return False
 
 
+def unnamed(naming: str) -> str:
+    """Say that nobody has named it, where that would be noted, and what names it."""
+    folder = "the cache of a user with a home"
+    with suppress(RuntimeError):
+        folder = str(_place("").parent)
+    return (
+        f"nobody has named on this machine (noted in {folder}: set XDG_CACHE_HOME if nothing can be kept "
+        f"there); if you trust it, name it first: {naming}"
+    )
+
+
 def _place(what: str) -> Path:
     return cache_directory() / "named" / sha256(what.encode("utf-8", "surrogatepass")).hexdigest()

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 from typing import IO
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +124,9 @@ class Trajectory:
                 names, units = ([str(each) for each in archive[key]] for key in ("names", "units"))
                 columns = dict(zip(names, archive["columns"], strict=True))
                 return cls(archive["times"], columns, {n: u for n, u in zip(names, units, strict=True) if u})
-        except (AttributeError, LookupError, TypeError, ValueError, EOFError, BadZipFile) as error:
+        except (OSError, MonitorError):
+            raise
+        except Exception as error:  # whatever numpy and zipfile raise of other content
             raise MonitorError(f"no recorded trajectory: {error}") from None
 
 

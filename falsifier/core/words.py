@@ -56,6 +56,16 @@ def resolving(value: float, difference: float, least: int = 6) -> int:
     return max(least, min(int(log10(ratio)) + 2, _MOST_DIGITS)) if 0.0 < ratio < inf else least
 
 
+def choosing(value: float, difference: float, least: int) -> int:
+    """Return how many digits tell a chosen number: all if it was written or rounded, else as ``resolving``.
+
+    >>> choosing(1000000.0005, 1.0, 6), choosing(0.1 + 0.2, 0.001, 6)
+    (11, 6)
+    """
+    written = digits(value)
+    return max(written, least) if written <= _EXACT_DIGITS else resolving(value, difference, least)
+
+
 def ends(low: float, high: float) -> tuple[str, str]:
     """Return both ends of a range, with digits that show a hundredth of it.
 
@@ -78,12 +88,8 @@ def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> l
     signals = {n: s.stepped(inf if space is None else space.stop_time) for n, s in candidate.signals.items()}
 
     def needed(name: str, value: float, least: int) -> int:
-        if (
-            written := digits(value)
-        ) <= _EXACT_DIGITS:  # somebody's number, or a rounded one, is told as it is
-            return max(written, least)
         width = ranges[name].high - ranges[name].low if name in ranges else 0.0
-        return resolving(value, width / 10_000.0, least)
+        return choosing(value, width / 10_000.0, least)
 
     told = {n: signal_text(s, needed(n, s.values[0], 6)) for n, s in signals.items()}
     facts = [("input", f"{labels.get(n, n)} {text}") for n, text in told.items()]

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import Experiment, Model
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import Model
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import FalsifierError, SimulationError, SpecError

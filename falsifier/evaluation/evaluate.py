@@ -15,7 +15,8 @@ import numpy as np
 
 from falsifier.core.arguments import finite, instance
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import GRID_ROUNDING, ModelInfo, Variable
+from falsifier.core.experiment import GRID_ROUNDING
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import (

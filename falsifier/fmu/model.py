@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.arguments import path_of
-from falsifier.core.model import Experiment, Interface, Model, ModelInfo
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import Interface, Model, ModelInfo
 from falsifier.core.signals import Signal, constant_pieces
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from falsifier.core.experiment import Experiment
 from falsifier.core.literals import one_line
-from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
 from falsifier.llm.candidate_text import defect

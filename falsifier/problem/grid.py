@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
 
+from falsifier.core.experiment import common_part, exact
 from falsifier.core.literals import digits
-from falsifier.core.model import common_part, exact
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import FreeSection
 from falsifier.stl import Formula, parse
@@ -23,6 +23,8 @@ _MAX_INTERVALS = 100_000
 _MANY_DIGITS = 8
 # Maximum number of steps of each kind per simulation; trajectories have one sample per output interval.
 MAX_STEPS = 10_000_000
+# In s: the program that runs FMUs takes times for equal that are a tenth of this apart.
+_SHORTEST_STEP = 1e-10
 # An input that changes this often within the formula's smallest window can meet each of its conditions.
 _PIECES_PER_WINDOW = 10
 # Minimum number of pieces if the windows ask for fewer, and their maximum number.
@@ -155,15 +157,16 @@ def _text(seconds: Fraction) -> str:
 
 
 def check_steps(stop_time: float, period: float | None, *, key: str | None = None) -> None:
-    """Check a period in s, stated at a key or else the FMU's step; SpecError if it makes too many steps."""
-    if period is not None and stop_time / period > MAX_STEPS:
+    """Check a period in s, stated at a key or else the FMU's step; SpecError if it is too short."""
+    smallest, shorten = stop_time / MAX_STEPS, "shorten it, or "
+    why = f"gives more than {MAX_STEPS:,} steps up to the stop time {stop_time:.10g} s"
+    if smallest < _SHORTEST_STEP:
+        smallest, shorten = _SHORTEST_STEP, ""
+        why = "is so short that times count as one; use a model whose time has a larger unit"
+    if period is not None and period < smallest:
         named = f"{key.rpartition('.')[2]} =" if key else "the FMU's step"
-        remedy = "" if key else "shorten it, or state an output interval: "
-        raise SpecError(
-            f"{named} {period:g} s gives more than {MAX_STEPS:,} steps up to the stop time "
-            f"{stop_time:.10g} s; {remedy}the smallest value is {stop_time / MAX_STEPS:g}",
-            key=key,
-        )
+        remedy = "" if key else f"{shorten}state an output interval: "
+        raise SpecError(f"{named} {period:g} s {why}; {remedy}the smallest value is {smallest:g}", key=key)
 
 
 def default_freedom(formulas: Iterable[str], *, stop_time: float, step: float) -> FreeSection:

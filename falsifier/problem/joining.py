@@ -7,9 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from falsifier.core.experiment import GRID_ROUNDING, Experiment, whole_steps
 from falsifier.core.files import absent
 from falsifier.core.literals import number_in
-from falsifier.core.model import GRID_ROUNDING, Experiment, Model, ModelInfo, whole_steps
+from falsifier.core.model import Model, ModelInfo
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import listed, readable
 from falsifier.errors import SpecError, did_you_mean, in_section, naming, setting, written

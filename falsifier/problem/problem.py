@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Literal
 
 from falsifier.context.values import Context, Named
 from falsifier.core.arguments import finite, instance, path_of, texts
+from falsifier.core.experiment import Experiment
 from falsifier.core.literals import shortest
-from falsifier.core.model import Experiment, Interface, Model, ModelInfo, Variable
+from falsifier.core.model import Interface, Model, ModelInfo, Variable
 from falsifier.core.ranges import number_names
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import ends

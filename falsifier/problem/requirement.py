@@ -5,8 +5,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from falsifier.core.arguments import instance
+from falsifier.core.experiment import Experiment
 from falsifier.core.literals import one_line
-from falsifier.core.model import Experiment, ModelInfo
+from falsifier.core.model import ModelInfo
 from falsifier.errors import FormulaError, SpecError, did_you_mean, in_section, setting
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement

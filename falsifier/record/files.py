@@ -116,18 +116,16 @@ def recorded_trajectory(directory: Path, name: str | None) -> Trajectory | None:
         if not is_own_file(path):
             raise OSError("it is no file of the run")
         content = path.read_bytes()
-    except OSError as error:
-        # Where only the best one is kept, it is the only file, and later than those that it has replaced.
-        left = [_index(p) for p in path.parent.glob("*.npz") if re.fullmatch(TRAJECTORY_NAMES, p.name)]
-        if not (isinstance(error, FileNotFoundError) and len(left) == 1 and left[0] > _index(path)):
-            _tell_lost(path, error.strerror or str(error))
-        return None
-    try:
         if is_intact(path, content):
             return Trajectory.load(BytesIO(content))
         _tell_lost(path, "its checksum does not match")
     except MonitorError as error:  # which somebody has written on purpose
         _tell_lost(path, str(error))
+    except OSError as error:
+        # Where only the best one is kept, it is the only file, and later than those that it has replaced.
+        left = [_index(p) for p in path.parent.glob("*.npz") if re.fullmatch(TRAJECTORY_NAMES, p.name)]
+        if not (isinstance(error, FileNotFoundError) and len(left) == 1 and left[0] > _index(path)):
+            _tell_lost(path, error.strerror or str(error))
     return None
 
 

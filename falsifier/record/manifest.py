@@ -15,6 +15,7 @@ from pydantic import ConfigDict, Field
 
 from falsifier import __version__
 from falsifier.context.values import Context
+from falsifier.core import named
 from falsifier.core.literals import shell_word
 from falsifier.core.model import Variable
 from falsifier.core.ranges import Range, ValueKind
@@ -183,8 +184,7 @@ def check_named(place: Path, sources: Iterable[ProblemSource]) -> None:
     for target in (source.target for source in sources if not is_named(source)):
         naming = written(f"python -m falsifier check {shell_word(target)}", f"load_problem({target!r})")
         raise JournalError(
-            f"{place}: made with {target}, a module that would be run, and nobody has named it on this "
-            f"machine; if you know what it does, name it first: {naming}"
+            f"{place}: made with {target}, a module that would be run, and which {named.unnamed(naming)}"
         )
 
 

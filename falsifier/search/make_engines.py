@@ -134,8 +134,11 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
 
 
 def note_llm(llm: LLMSettings | None) -> None:
-    """Note that the user has named this language model with its server, which a record may name later."""
-    if llm is not None and not llm.is_usual:
+    """Note that the user has named this language model with its server, which a record may name later.
+
+    The usual server, too: once the environment has another address, it is none.
+    """
+    if llm is not None:
         named.note(llm.check)
 
 
@@ -148,7 +151,7 @@ def check_llm(place: Path, llm: LLMSettings | None) -> None:
     if not (llm is None or llm.is_usual or named.is_noted(llm.check)):
         raise ChatSetupError(
             f"{place}: prompts, and a key of yours if the provider needs one, would go to {llm.told}, which "
-            f"nobody has named on this machine; if they may, name it first: {llm.check}"
+            f"{named.unnamed(llm.check)}"
         )
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from falsifier.core.experiment import Experiment
 from falsifier.core.function_model import FunctionModel
-from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.errors import MonitorError, SimulationError, SpecError
@@ -92,8 +93,6 @@ def test_what_goes_wrong_is_a_failed_simulation(
         ({"step_size": 0.0}, "step_size: expected a positive number"),
         ({"step_size": 0.03}, "^step_size: .* try step_size = 0.02"),
         ({"step_size": 0.2}, "^step_size: .* try step_size = 0.1"),
-        ({"step_size": 1e-11}, "^step_size: step_size = 1e-11 s: expected 1e-10 s or more"),
-        ({"stop_time": 1e-9, "output_interval": 1e-12}, "^output_interval: .* expected 1e-10 s or more"),
         ({"time_limit": math.inf}, "time_limit: expected a finite number"),
         ({"outputs": "x"}, "outputs: expected a tuple of names, got 'x'"),
     ],

@@ -290,6 +290,13 @@ def test_a_free_space_takes_as_many_control_points_as_it_allows() -> None:
     assert len(fit(space, Candidate({"u": steps})).candidate.signals["u"].times) == 20
 
 
+def test_control_points_of_nanoseconds_are_not_fixed_ones_because_they_are_near_in_seconds() -> None:
+    fixed = SearchSpace((InputRange("u", 0.0, 1.0, control_points=3, interpolation="linear"),), (), 1e-8)
+    fixed.admit(Candidate({"u": Signal((0.0, 5e-9, 1e-8), (0.0, 1.0, 0.0), "linear")}))
+    with pytest.raises(CandidateError, match=r"one at 5\.5e-09 s instead of 5e-09 s"):
+        fixed.admit(Candidate({"u": Signal((0.0, 5.5e-9, 1e-8), (0.0, 1.0, 0.0), "linear")}))
+
+
 def test_inputs_that_are_not_searched_are_left_out_and_said() -> None:
     fitted = fit(lag_problem().space, Candidate({"u": RAMP, "v": RAMP}))
     assert list(fitted.candidate.signals) == ["u"]
@@ -300,7 +307,9 @@ def test_a_missing_parameter_has_its_nominal_value_and_needs_one() -> None:
     space = lag_problem(points=1, parameters=[START]).space
     fitted = fit(space, Candidate({"u": Signal((0.0,), (0.5,), "linear")}))
     assert fitted.candidate.parameters == {"x0": 0.0}
-    assert "x0 is not given" in fitted.notes[0]
+    assert "x0 is not given: its nominal value, 0, is used" in fitted.notes[0]
+    exact = replace(space, parameters=(replace(START, nominal=0.123456789),))
+    assert "0.123456789, is used" in fit(exact, Candidate({"u": RAMP})).notes[-1]
     unknown = replace(space, parameters=(replace(START, nominal=None),))
     with pytest.raises(CandidateError, match="'x0' is searched and missing"):
         fit(unknown, Candidate({"u": RAMP}))

@@ -4,7 +4,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import MonitorError, SimulationError, SpecError
 from falsifier.evaluation.confirm import (

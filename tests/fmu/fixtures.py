@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Final
 from zipfile import ZipFile
 
-from falsifier.core.model import Experiment, Interface
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import Interface
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel, System

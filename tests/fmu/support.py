@@ -20,7 +20,7 @@ SCRIPT = """
 import os, sys, time
 from pathlib import Path
 from falsifier.fmu import FmuModel
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 model = FmuModel(sys.argv[1])
 experiment = Experiment(1.0, 0.1, ("y",))
 def go(misdeed=0):

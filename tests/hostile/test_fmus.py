@@ -124,7 +124,7 @@ SCRIPT = """
 import os, sys
 from falsifier.errors import FalsifierError
 from falsifier.fmu import FmuModel
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 model = FmuModel(sys.argv[1], allow=[f"write:{sys.argv[2]}"])
 def go(misdeed=0, time_limit=60.0):
     experiment = Experiment(1.0, 0.1, ("y",), None, None, time_limit)

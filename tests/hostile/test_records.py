@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import sys
 from collections.abc import Callable, Iterator
@@ -11,9 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from falsifier.campaigns import CampaignRequest, cross, resume_campaign
 from falsifier.campaigns.directory import CampaignRecord, write_campaign
+from falsifier.cli import cli
 from falsifier.core.files import checksum, seal
 from falsifier.counterexamples.case import counterexample_case
 from falsifier.counterexamples.store import FILE_NAME, save, to_store
@@ -24,7 +27,7 @@ from falsifier.record.journal import repair
 from falsifier.record.manifest import environment
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
-from falsifier.search.make_engines import note_llm
+from falsifier.search.make_engines import check_llm, note_llm
 from falsifier.search.request import LLMSettings
 from falsifier.testing import lag_problem
 from falsifier.views.report import html_report
@@ -59,11 +62,34 @@ def theirs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def test_a_module_that_only_a_record_names_is_not_imported(theirs: Path) -> None:
     for use in (resume, lambda run: counterexample_case(run).problem()):
-        with pytest.raises(JournalError, match=f"nobody has named it.*{TARGET}"):
+        with pytest.raises(JournalError, match=f"nobody has named on this.*{TARGET}"):
             use(theirs / "run")
     assert not (theirs / "imported").exists()
     load_problem(TARGET)
     assert resume(theirs / "run")[0].falsified and counterexample_case(theirs / "run").problem()
+
+
+@pytest.mark.usefixtures("at_the_command_line")
+def test_the_command_that_the_refusal_states_names_a_module(theirs: Path) -> None:
+    with pytest.raises(JournalError) as refused:
+        resume(theirs / "run")
+    command = shlex.split(str(refused.value).rpartition("name it first: python -m falsifier ")[2])
+    assert CliRunner().invoke(cli, command).exit_code == 0
+    assert resume(theirs / "run")[0].falsified
+
+
+def test_the_command_that_the_refusal_states_names_a_server(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    with serving() as server:  # its script has no answers, so the check itself fails
+        theirs = LLMSettings(name="openai/x", api_base=server.url, options={"user": "a b", "store": True})
+        with pytest.raises(ChatSetupError) as refused:
+            check_llm(tmp_path, theirs)
+        command = shlex.split(str(refused.value).rpartition("name it first: falsifier ")[2])
+        CliRunner().invoke(cli, command)
+        assert server.received
+    check_llm(tmp_path, theirs)
 
 
 def test_a_module_of_the_same_name_in_another_place_is_another_one(
@@ -74,7 +100,7 @@ def test_a_module_of_the_same_name_in_another_place_is_another_one(
     (theirs / "somebodys_module.py").rename(theirs / "other" / "somebodys_module.py")
     monkeypatch.syspath_prepend(theirs / "other")
     del sys.modules["somebodys_module"]
-    with pytest.raises(JournalError, match="nobody has named it"):
+    with pytest.raises(JournalError, match="nobody has named"):
         resume(theirs / "run")
 
 
@@ -112,6 +138,28 @@ def test_nor_is_that_of_a_campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         resume_campaign(tmp_path / "campaign")
 
 
+def test_a_server_that_the_environment_named_for_a_run_is_asked_without_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("OPENAI_API_BASE", "http://127.0.0.1:9")
+    named = LLMSettings(name="openai/x")
+    note_llm(named)
+    monkeypatch.delenv("OPENAI_API_BASE")
+    assert not named.is_usual
+    check_llm(tmp_path, named)
+
+
+def test_where_nothing_can_be_noted_the_message_says_what_to_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", os.devnull)
+    named = LLMSettings(name="openai/x", api_base="http://127.0.0.1:9")
+    note_llm(named)
+    with pytest.raises(ChatSetupError, match=f"noted in {os.devnull}/.*: set XDG_CACHE_HOME if"):
+        check_llm(tmp_path, named)
+
+
 @pytest.mark.parametrize("name", ["openai/gpt-5-mini", "openai/own"])
 def test_the_providers_own_server_and_that_of_the_environment_need_no_naming(
     name: str, monkeypatch: pytest.MonkeyPatch
@@ -143,8 +191,9 @@ def archive(save: Callable[..., None] = np.savez, **parts: Any) -> bytes:
         archive(columns=np.zeros((1, 5))),
         archive(times=np.array([object()])),
         archive(np.savez_compressed, columns=np.zeros((1, 1000)), times=np.arange(1000.0)),
+        archive(columns=np.zeros((1, 1000))).replace(b"(1, 1000), }" + 10 * b" ", b"(1, 99999999999999), }"),
     ],
-    ids=["text", "cut off", "too few", "too short", "pickle", "compressed"],
+    ids=["text", "cut off", "too few", "too short", "pickle", "compressed", "huge"],
 )
 def test_a_trajectory_of_any_content_is_one_that_was_not_kept(content: bytes, tmp_path: Path) -> None:
     written(tmp_path, f"trajectories/0-{checksum(content)}.npz")

@@ -41,7 +41,7 @@ from pathlib import Path
 from tests.hostile import cage
 cage.enter(Path(os.environ["TMPDIR"]))
 {before}
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.errors import FalsifierError
 from falsifier.fmu import FmuModel
 

@@ -5,7 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.formalizing import ExampleSignal, example_trajectory, formalizing_messages, read_readings

@@ -12,7 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from falsifier.core.model import Experiment, Interface
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import Interface
 from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel
 

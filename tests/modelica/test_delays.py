@@ -5,7 +5,8 @@ from math import factorial
 import numpy as np
 import pytest
 
-from falsifier.core.model import Experiment, Interface
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import Interface
 from falsifier.core.signals import Signal
 from falsifier.fmu import FmuModel
 from tests.modelica.conftest import Build

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.fmu import FmuModel
 from tests.modelica.conftest import Build
 from tests.modelica.exporter import ROOT

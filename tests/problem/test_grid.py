@@ -3,6 +3,8 @@ from pathlib import Path
 import pytest
 
 from falsifier.errors import SpecError
+from falsifier.evaluation.confirm import confirm
+from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.grid import check_steps, choose_grid, default_freedom, fitting_interval, formula_times
 from falsifier.problem.problem import Problem
 from falsifier.stl import parse
@@ -94,6 +96,24 @@ def test_more_steps_are_refused_with_the_smallest_period(stop_time: float, perio
     with pytest.raises(SpecError, match=r"k: .* more than 10,000,000 steps .* smallest value") as error:
         check_steps(stop_time, period, key="k")
     check_steps(stop_time, float(str(error.value).rpartition(" ")[2]) * 1.000001, key="k")
+
+
+def test_the_shortest_step_is_refused_in_words_and_half_of_it_confirms() -> None:
+    def problem(interval: float) -> Problem:
+        return Problem.from_fmu(
+            *(fmu_path("Lag_2"), "G[0,1e-8] (u <= 0)"),
+            inputs={"u": (0.5, 1.0)},
+            stop_time=1e-8,
+            output_interval=interval,
+        )
+
+    with pytest.raises(SpecError, match=r"output_interval: .* 5e-11 s is so short .* value is 1e-10"):
+        problem(5e-11)
+    with pytest.raises(SpecError, match=r"FMU's step 1e-12 s is so .* unit; state an output interval: "):
+        choose_grid(1e-8, fmu_step=1e-12)
+    finest = problem(1e-10)
+    found = evaluate(finest, finest.space.decode([1.0] * 5))
+    assert confirm(finest, found).outcome == "confirmed"
 
 
 @pytest.mark.parametrize(

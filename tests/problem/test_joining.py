@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
+from falsifier.core.experiment import Experiment
 from falsifier.core.files import bundled
-from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.fmu import System, read_info
 from falsifier.problem.joining import Joined, join, join_formula, placed

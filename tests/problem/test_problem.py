@@ -7,8 +7,8 @@ from typing import Any, get_args
 import pytest
 
 from falsifier.context.values import Context, Named
+from falsifier.core.experiment import Experiment
 from falsifier.core.files import bundled
-from falsifier.core.model import Experiment
 from falsifier.core.ranges import InputRange, Scale
 from falsifier.core.space import SearchSpace
 from falsifier.errors import FormulaError, SpecError

@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from numpy import int64
 
+from falsifier.core.experiment import Experiment
 from falsifier.core.files import bundled
-from falsifier.core.model import Experiment
 from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.store import changes_since, load_counterexample
 from falsifier.engines import make_engine

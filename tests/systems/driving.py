@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel

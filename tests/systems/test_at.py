@@ -6,7 +6,7 @@ from typing import Any, Literal
 import numpy as np
 import pytest
 
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.core.trajectory import Trajectory
 from falsifier.fmu import FmuModel
 from tests.systems.driving import ROOT, Array, evenly, golden, robustness

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.core.signals import Signal
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import evaluate

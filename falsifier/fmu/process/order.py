@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
-from falsifier.core.model import GRID_ROUNDING, Interface, whole_steps
+from falsifier.core.experiment import GRID_ROUNDING, whole_steps
+from falsifier.core.model import Interface
 from falsifier.errors import SpecError
 from falsifier.fmu.description.model_description import Description
 from falsifier.fmu.process import encoding

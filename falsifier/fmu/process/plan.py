@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.errors import ModelError, SimulationError, did_you_mean
 from falsifier.fmu.description.model_description import Description
 

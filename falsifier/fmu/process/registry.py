@@ -14,7 +14,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.core.model import Experiment, check_finite
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import check_finite
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError
 from falsifier.fmu.process.order import Order

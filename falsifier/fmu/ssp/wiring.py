@@ -76,7 +76,7 @@ class Elements:
         for name, given in self.given.items():
             targets = list(self._targets(name))
             if name in own:
-                found[name] = self._value(given, own[name])
+                found[name] = self._value(given, own[name], self.units)
             elif not targets and name not in fed:  # what feeds a connector replaces its value
                 self.notes.append(f"the parameter {name} of the package names nothing that can be set")
             for end, source, (factor, offset) in targets:
@@ -84,7 +84,8 @@ class Elements:
                     continue
                 if refusal := self.descriptions[end[0]].info[end[1]].refusal:
                     raise self.wrong(f"the parameter {title_of(end)} cannot be set: {refusal}")
-                value = self._value(given, self._passing(source, end, factor, offset))
+                variable = self._passing(source, end, factor, offset)
+                value = self._value(given, variable, self._units_of(source))
                 found[title_of(end)] = value if isinstance(value, str) else factor * value + offset
         return found
 
@@ -162,8 +163,8 @@ class Elements:
                 if title_of(source) == name:
                     yield end, source, found
 
-    def _value(self, given: Given, variable: Variable) -> float | str:
-        """Return a value for a variable, in its unit."""
+    def _value(self, given: Given, variable: Variable, units: Mapping[str, Unit]) -> float | str:
+        """Return a value for a variable, in its unit, which is one of these."""
         value, change = given.value, given.transformation
         if isinstance(value, str) and not given.is_item:
             if variable.kind != "string":
@@ -177,8 +178,8 @@ class Elements:
         if variable.kind == "string":
             raise self.wrong(f"{value:g} is a number, but {variable.name!r} is a text")
         if not change.suppress:
-            known, is_relative = (self.units, self.units), variable.is_relative
-            found = conversion(given.unit, variable.unit, known, is_relative=is_relative)
+            known = units, units
+            found = conversion(given.unit, variable.unit, known, is_relative=variable.is_relative)
             if found is None:
                 raise self.wrong(
                     f"the parameter {given.name} is in {given.unit}, {variable.name!r} in {variable.unit}, "

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import get_args
 
 from falsifier.core.arguments import finite, instance, one_of, path_of, positive
-from falsifier.core.model import GRID_ROUNDING, Interface, ModelInfo, Variable, common_part, exact
+from falsifier.core.experiment import GRID_ROUNDING, common_part, exact
+from falsifier.core.model import Interface, ModelInfo, Variable
 from falsifier.errors import SpecError
 from falsifier.fmu.description.archive import file_hash
 from falsifier.fmu.description.model_description import Description

@@ -6,7 +6,8 @@ from hashlib import sha256
 from pathlib import Path
 
 from falsifier.core.arguments import instance
-from falsifier.core.model import Experiment, ModelInfo
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError

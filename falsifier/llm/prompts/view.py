@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.context.values import Context
-from falsifier.core.model import Experiment, ModelInfo, Variable
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.errors import SpecError, did_you_mean

@@ -11,7 +11,7 @@ from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
 from falsifier.core.literals import shell_word
 from falsifier.core.signals import Signal
-from falsifier.core.words import counted, in_unit, listed, readable, resolving, with_unit
+from falsifier.core.words import choosing, counted, in_unit, listed, readable, with_unit
 from falsifier.counterexamples.store import SHRUNK, beside
 from falsifier.engines import ENGINES
 from falsifier.problem.problem import held_text
@@ -120,10 +120,10 @@ def parameter_facts(shown: Shown) -> list[Fact]:
 
 
 def _entered(shown: Shown, name: str, value: float) -> str:
-    """Return a value with digits to enter it by: ten, or more to show a millionth of its range."""
+    """Return a value to enter: as it was written, or with digits that show a millionth of its range."""
     manifest = shown.run.manifest
     widths = {r.name: r.high - r.low for r in (*manifest.inputs, *manifest.parameters)}
-    return readable(value, resolving(value, widths.get(name, 0.0) / 1e6, 10))
+    return readable(value, choosing(value, widths.get(name, 0.0) / 1e6, 10))
 
 
 def tried(section: Section) -> list[Fact]:

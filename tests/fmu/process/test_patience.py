@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.errors import SimulationError
 from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.process.plan import make_plan

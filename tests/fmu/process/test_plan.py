@@ -2,7 +2,7 @@
 
 import pytest
 
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.errors import ModelError
 from falsifier.fmu.description.model_description import read_description
 from falsifier.fmu.process.outcome import crash

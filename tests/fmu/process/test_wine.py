@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from falsifier.core.model import Experiment, Interface
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import Interface
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError, SimulationError

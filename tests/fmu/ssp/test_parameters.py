@@ -6,6 +6,7 @@ import pytest
 
 from falsifier.errors import SpecError
 from falsifier.fmu import read_package
+from tests.fmu.fixtures import altered, path
 from tests.fmu.packages import NAMESPACES, PI, PLANT, structure, system, values, write
 
 
@@ -67,6 +68,18 @@ def test_units_types_and_names_that_mean_nothing(tmp_path: Path) -> None:
     model = read_package(write(tmp_path / "p.ssp", ssd, "Plant_2"))
     assert model.frame.values == ()
     assert "the parameter engine.T of the package names nothing that can be set" in model.info.notes
+
+
+def test_a_value_has_the_units_of_the_fmu_that_it_is_for(tmp_path: Path) -> None:
+    gain = altered(path("Gain_2mm"), tmp_path / "g.fmu", lambda x: x.replace(b'r="0.001"', b'r="0.004"'))
+    one, two = (f'<ssd:Component name="{n}" source="resources/{n}.fmu"/>' for n in ("one", "two"))
+    bound = bindings(inline("one.measured Real 1 m", "two.measured Real 1 m"))
+    more: dict[str, str | bytes] = {
+        "resources/one.fmu": path("Gain_2mm").read_bytes(),
+        "resources/two.fmu": gain.read_bytes(),
+    }
+    file = write(tmp_path / "p.ssp", structure(system(one + two, before=bound)), more=more)
+    assert starts(file) == {"one.measured": 1000.0, "two.measured": 250.0}
 
 
 def test_a_connection_of_parameters_converts_the_value(tmp_path: Path) -> None:

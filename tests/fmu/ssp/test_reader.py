@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import SpecError
 from falsifier.fmu import read_package

@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from falsifier.core.model import Experiment, Variable
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import Variable
 from falsifier.core.signals import Signal
 from falsifier.fmu import Component, Connection, Coupling, Frame, System
 from falsifier.problem.loading import load_problem

@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from falsifier.core.model import Experiment
+from falsifier.core.experiment import Experiment
 from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SpecError
 from falsifier.fmu import Component, Coupling, System

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.core.model import Experiment, Variable
+from falsifier.core.experiment import Experiment
+from falsifier.core.model import Variable
 from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.fmu import Component, Connection, Coupling, Frame, System
 from falsifier.fmu.description import libraries

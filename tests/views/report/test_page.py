@@ -121,10 +121,13 @@ def test_numbers_to_enter_are_not_rounded_to_six_digits() -> None:
     manifest = SimpleNamespace(
         stop_time=43216.0, inputs=(InputRange("u", 0.0, 2147483647.0),), parameters=(narrow,)
     )
-    candidate = Candidate({"u": u}, {"mass": 1e12 + 0.25})
+    candidate = Candidate({"u": u}, {"mass": 1e12 + 0.25, "k": 0.123456789012})
     shown = SimpleNamespace(candidate=candidate, units={}, run=SimpleNamespace(manifest=manifest))
     assert input_table(shown).rows == (("0", "2147483647"), ("43215.25", "0.3333333333"))  # type: ignore[arg-type]
-    assert parameter_facts(shown) == [("mass", "1000000000000.25")]  # type: ignore[arg-type]
+    assert parameter_facts(shown) == [  # type: ignore[arg-type]
+        ("mass", "1000000000000.25"),
+        ("k", "0.123456789012"),
+    ]
     assert signal_text(Signal((0.0,), (2147483647.0,))) == "constant 2147483647"
 
 
