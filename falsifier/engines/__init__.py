@@ -66,7 +66,10 @@ ENGINES: Mapping[str, Registered] = MappingProxyType(
             extra="optuna",
         ),
         "hybrid": Registered(
-            "falsifier.engines.hybrid:Hybrid", "a language model with the surrogate", is_free=True
+            "falsifier.engines.hybrid:Hybrid",
+            "a language model with the surrogate",
+            is_free=True,
+            uses_context=True,
         ),
     }
 )

@@ -8,6 +8,7 @@ from typing import Any
 
 from falsifier.core.literals import one_line
 from falsifier.core.words import counted, readable
+from falsifier.engines import ENGINES
 from falsifier.fmu import watching
 from falsifier.problem.problem import held_text
 from falsifier.search import events
@@ -146,10 +147,7 @@ class News:
                 replayed = f", {known} from the journal" if event.replayed else ""
                 formulas = (f"{problem.name}: {problem.requirement.formula}" for problem in event.problems)
                 sent = f", prompts go to {event.server}" if event.server else ""
-                context = [problem.named_context for problem in event.problems]
-                files = [*(name for each in context for name in each.files)]
-                files += ["files inside the FMU"] * any(each.fmu for each in context)
-                read = f", context: {', '.join(dict.fromkeys(files))}" if files else ""  # a spec may name it
+                read = f", context: {', '.join(files)}" if (files := _context_files(event)) else ""
                 return [*formulas, f"engine {event.engines[0]}{sent}{read}{replayed}", *_choices(event)]
             case events.Evaluated(evaluation=ended, spent=spent):
                 told = []
@@ -205,6 +203,16 @@ def log_fmu(path: Path) -> events.Listener:
                 file.write("\n".join(lines) + "\n")
 
     return append
+
+
+def _context_files(event: events.RunStarted) -> dict[str, None]:
+    """Return the context files that are read, which a spec may name; most engines read none."""
+    engine = ENGINES.get(event.engines[0])  # one that is a language model has another name
+    if engine is not None and not engine.uses_context:
+        return {}
+    named = [problem.named_context for problem in event.problems]
+    files = [*(name for each in named for name in each.files)]
+    return dict.fromkeys([*files, *["files inside the FMU"] * any(each.fmu for each in named)])
 
 
 def _choices(event: events.RunStarted) -> list[str]:

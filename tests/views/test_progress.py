@@ -1,5 +1,6 @@
 import re
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -57,11 +58,16 @@ def test_in_a_notebook_the_command_lines_display_is_that_line(front_end: Shown) 
     assert "falsified; HARD: violation confirmed" in front_end.lines[-1]
 
 
-def test_the_first_lines_say_which_context_a_spec_names(capsys: pytest.CaptureFixture[str]) -> None:
-    problem = replace(hard(), named_context=Named(("/home/me/notes.md",), fmu=True))
+@pytest.mark.parametrize(("engine", "is_read"), [("surrogate", True), ("corners", False)])
+def test_the_first_lines_say_which_context_of_a_spec_is_read(
+    engine: str, is_read: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    notes = tmp_path / "notes.md"
+    notes.write_text("x must stay below 0.9\n")
+    problem = replace(hard(), named_context=Named((str(notes),)))
     with make_display() as display:
-        falsify(problem, "corners", budget=1, listeners=[display])
-    assert "context: /home/me/notes.md, files inside the FMU" in capsys.readouterr().err.splitlines()[1]
+        falsify(problem, engine, budget=1, listeners=[display])
+    assert (f", context: {notes}" in capsys.readouterr().err.splitlines()[1]) == is_read
 
 
 def test_a_cause_is_told_once_and_that_most_have_failed(capsys: pytest.CaptureFixture[str]) -> None:
