@@ -50,7 +50,8 @@ from falsifier.llm.providers import (
     stated_address,
     unset_key,
 )
-from falsifier.llm.transport import UnusableReplyError, within
+from falsifier.llm.reply_bodies import UnusableReplyError
+from falsifier.llm.transport import within
 from falsifier.llm.usage import Price, tokens_sent, usage_of
 
 _LOG = logging.getLogger(__name__)

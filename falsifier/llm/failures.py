@@ -16,7 +16,8 @@ from falsifier.core.words import shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, setting
 from falsifier.llm.litellm_adapter import own_words, without_trace
 from falsifier.llm.providers import known, server_address, unset_key
-from falsifier.llm.transport import BrokenReplyError, RefusedReplyError
+from falsifier.llm.reply_bodies import BrokenReplyError
+from falsifier.llm.transport import RefusedReplyError
 
 # 200: the body is not JSON, typically an HTML page from a proxy.
 _TRANSIENT_STATUS = frozenset({200, 408, 409, 425, 429})
