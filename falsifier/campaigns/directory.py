@@ -87,9 +87,8 @@ def _known(places: Sequence[Path], remedy: str) -> list[Path]:
     for place in places:
         if holds_run(place):
             found.append(place)
-        elif (
-            journal := place / JOURNAL
-        ).exists() and journal.stat().st_size:  # made empty before the manifest
+        elif (place / JOURNAL).exists() and (place / JOURNAL).stat().st_size:
+            # It is empty until a run that begins has written its manifest.
             _tell_left_out(place, remedy)
     return found
 

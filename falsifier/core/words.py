@@ -72,8 +72,8 @@ def ends(low: float, high: float) -> tuple[str, str]:
     >>> ends(0.0, 100.0), ends(999999.999, 1000000.001)
     (('0', '100'), ('999999.999', '1000000.001'))
     """
-    digits = resolving(max(abs(low), abs(high)), (high - low) / 100.0)
-    return readable(low, digits), readable(high, digits)
+    needed = resolving(max(abs(low), abs(high)), (high - low) / 100.0)
+    return readable(low, needed), readable(high, needed)
 
 
 def candidate_facts(candidate: Candidate, space: SearchSpace | None = None) -> list[tuple[str, str]]:

@@ -211,8 +211,9 @@ def _context_files(event: events.RunStarted) -> dict[str, None]:
     if engine is not None and not engine.uses_context:
         return {}
     named = [problem.named_context for problem in event.problems]
-    files = [*(name for each in named for name in each.files)]
-    return dict.fromkeys([*files, *["files inside the FMU"] * any(each.fmu for each in named)])
+    files = [name for each in named for name in each.files]
+    files += ["files inside the FMU"] * any(each.fmu for each in named)
+    return dict.fromkeys(files)
 
 
 def _choices(event: events.RunStarted) -> list[str]:

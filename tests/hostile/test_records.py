@@ -44,6 +44,12 @@ TARGET = "python:somebodys_module:problem"
 
 
 @pytest.fixture
+def new_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A cache in which nothing is noted yet."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+@pytest.fixture
 def theirs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder with a run and the module that makes its problem; nobody has named it on this machine."""
     (tmp_path / "somebodys_module.py").write_text(MODULE)
@@ -78,10 +84,8 @@ def test_the_command_that_the_refusal_states_names_a_module(theirs: Path) -> Non
     assert resume(theirs / "run")[0].falsified
 
 
-def test_the_command_that_the_refusal_states_names_a_server(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+@pytest.mark.usefixtures("new_cache")
+def test_the_command_that_the_refusal_states_names_a_server(tmp_path: Path) -> None:
     with serving() as server:  # its script has no answers, so the check itself fails
         theirs = LLMSettings(name="openai/x", api_base=server.url, options={"user": "a b", "store": True})
         with pytest.raises(ChatSetupError) as refused:
@@ -104,10 +108,10 @@ def test_a_module_of_the_same_name_in_another_place_is_another_one(
         resume(theirs / "run")
 
 
+@pytest.mark.usefixtures("new_cache")
 def test_a_server_that_only_a_record_names_is_not_asked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("OPENAI_API_KEY", "sk-test-not-a-key")
     falsify("AT1", "uniform", budget=1, directory=tmp_path / "run")
     described = json.loads((tmp_path / "run" / "manifest.json").read_text())
@@ -128,8 +132,8 @@ def test_a_server_that_only_a_record_names_is_not_asked(
         assert server.received
 
 
-def test_nor_is_that_of_a_campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+@pytest.mark.usefixtures("new_cache")
+def test_nor_is_that_of_a_campaign(tmp_path: Path) -> None:
     theirs = LLMSettings(name="openai/x", api_base="http://127.0.0.1:9")
     runs = cross([ProblemSource(target="AT1")], [theirs], seeds=[0], budget=Budget(1))
     record = CampaignRecord(**environment(), request=CampaignRequest(runs=runs), hashes={})
@@ -138,10 +142,10 @@ def test_nor_is_that_of_a_campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         resume_campaign(tmp_path / "campaign")
 
 
+@pytest.mark.usefixtures("new_cache")
 def test_a_server_that_the_environment_named_for_a_run_is_asked_without_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("OPENAI_API_BASE", "http://127.0.0.1:9")
     named = LLMSettings(name="openai/x")
     note_llm(named)
