@@ -119,7 +119,7 @@ if TYPE_CHECKING:
         read_info as read_info,
         read_package as read_package,
     )
-    from falsifier.llm.client import connect as connect
+    from falsifier.llm.connect import connect as connect
     from falsifier.llm.messages import Chat as Chat, Exchange as Exchange
     from falsifier.llm.prompts import VARIANTS as VARIANTS
     from falsifier.llm.scripted import ScriptedChat as ScriptedChat

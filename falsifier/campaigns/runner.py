@@ -182,7 +182,7 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
         ChatError: for an unknown provider, an option that it does not have, or a missing key.
         ModelError: if an FMU cannot be used.
     """
-    from falsifier.llm.client import preflight
+    from falsifier.llm.connect import preflight
 
     runs = tuple(request.named().values())
     for run in runs:

@@ -116,7 +116,8 @@ def open_chat(llm: LLMSettings, *, max_cost: float | None = None, attempts: int 
         SpecError: if the cost is limited although the price is unknown.
         ChatError: for an unknown provider, a missing key, or another server than that of the settings.
     """
-    from falsifier.llm.client import DEFAULT_ATTEMPTS, DEFAULT_TIMEOUT, connect
+    from falsifier.llm.client import DEFAULT_ATTEMPTS, DEFAULT_TIMEOUT
+    from falsifier.llm.connect import connect
 
     check_recorded(llm.name, llm.api_base)
     chat = connect(

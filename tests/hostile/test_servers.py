@@ -10,7 +10,8 @@ import pytest
 
 from falsifier.engines.llm import LLMEngine
 from falsifier.errors import ChatError
-from falsifier.llm.client import LiteLLMChat, connect
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.connect import connect
 from falsifier.record.run import falsify
 from falsifier.search.budget import Budget
 from falsifier.search.result import Result

@@ -6,7 +6,7 @@ import pytest
 
 from falsifier.errors import ChatError
 from falsifier.llm.check import Feature, check_chat
-from falsifier.llm.client import connect
+from falsifier.llm.connect import connect
 from falsifier.llm.messages import Usage
 from tests.llm.server import Step, serving
 

@@ -6,7 +6,8 @@ import pytest
 
 from falsifier.errors import ChatError, ChatSetupError
 from falsifier.llm import litellm_adapter
-from falsifier.llm.client import LiteLLMChat, connect, preflight
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.connect import connect, preflight
 from falsifier.llm.conversation import converse
 from falsifier.llm.messages import ChatReply, Message, Usage
 from falsifier.llm.providers import NO_KEY, find_key, first_mode, known, server_address

@@ -13,7 +13,8 @@ import pytest
 
 from falsifier.errors import ChatSetupError
 from falsifier.llm import model_file
-from falsifier.llm.client import LiteLLMChat, connect
+from falsifier.llm.client import LiteLLMChat
+from falsifier.llm.connect import connect
 from falsifier.llm.messages import UNREADABLE, Mode
 from falsifier.llm.replies import ReplyForm
 from falsifier.testing import START, lag_problem
