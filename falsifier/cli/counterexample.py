@@ -222,7 +222,7 @@ def _shrink(
         "files": list(map(str, paths)),
     }
     lines = [case.text] if case.is_miss else []
-    end = "no simpler one found nearby" if shrunk.minimal else "the budget is used up"
+    end = "nothing simpler found nearby" if shrunk.minimal else "the budget is used up"
     done = "not shrunk" if in_one_line(found.candidate) == in_one_line(original.candidate) else "shrunk"
     lines.append(f"{problem.name}: {done} with {counted(shrunk.simulations, 'simulation')}; {end}")
     if confirmation is not None:

@@ -89,7 +89,7 @@ def test_what_was_computed_is_shown_if_it_cannot_be_written(
     assert _carried_out(["explain", "run", "--shrink", "--out", "full.json", "--quiet"]) == 3
     told = capsys.readouterr()
     assert "full.json cannot be written: No space left on device" in told.err
-    assert "AT1: not shrunk with " in told.out and "; no simpler one found nearby" in told.out
+    assert "AT1: not shrunk with " in told.out and "; nothing simpler found nearby" in told.out
     assert _carried_out(["simulate", "AT1", "--set", "throttle=50", "--out", "full"]) == 3
     told = capsys.readouterr()
     assert "full/trajectory.csv cannot be written" in told.err
