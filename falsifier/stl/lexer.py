@@ -59,7 +59,9 @@ _PAST = (
 )
 # What was meant by a name; single capitals are operators only as they are written.
 _INSTEAD = {
-    **dict.fromkeys(("once", "since", *"OPSY"), _PAST.format("once", "F")),
+    **dict.fromkeys(
+        ("once", "since", *"OPSY"), _PAST.format("once", "F") + "; G (a -> once b) is not (not b U a)"
+    ),
     **dict.fromkeys(("historically", "H"), _PAST.format("historically", "G")),
     **dict.fromkeys(("W", "weak_until", "weakuntil"), "a W b is not (not b U not a)"),
     **dict.fromkeys(("R", "release"), "a R b is (b U (a and b)) or G b"),

@@ -148,6 +148,7 @@ MISTAKES = [
     ("x <= 3 y <= 3", 8, "join two formulas"),
     ("G[0,2] (x <= 3) (y <= 100)", 17, "join two formulas"),
     ("once[0,2] (x <= 3)", 11, "(F[2,2] a -> F[0,2] b)"),
+    ("G (a -> once b)", 14, "not (not b U a)"),
     ("historically (x <= 3)", 14, "write G (a -> historically[0,2] b) as G[0,18] (F[2,2] a -> G[0,2] b)"),
     ("G[0,1] (x <= P", 15, "it closes the '(' at position 8"),
     ("G (a -> b S c)", 11, "no operators on the past"),
