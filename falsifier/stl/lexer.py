@@ -15,6 +15,7 @@ from falsifier.errors import FormulaError
 
 FUNCTIONS = ("abs", "sqrt", "exp", "log", "sin", "cos", "min", "max")
 TEMPORAL = ("G", "F", "U", "X", "always", "eventually", "until", "next")
+_COMPARING = ("<", "<=", ">", ">=", "==", "!=")
 RESERVED = frozenset((*TEMPORAL, "not", "and", "or", "true", "false"))
 
 _IDENTIFIER = r"(?:[^\W\d]|\$)[\w$]*"
@@ -45,8 +46,8 @@ _HINTS = {
     "'": "a single quote opens a Modelica name and needs a second one",
     '"': "a double quote opens a name and needs a second one",
     "≤": "write <=", "≥": "write >=", "≠": "write !=", "¬": "write not", "∧": "write and", "∨": "write or",
-    "→": "write ->", "↔": "write <->", "□": "write G", "◇": "write F", "·": "write *",
-    "~": "write not; unequal is !=",
+    **dict.fromkeys("→⇒⟹", "write ->"), **dict.fromkeys("↔⇔", "write <->"), "□": "write G", "◇": "write F",
+    "·": "write *", "~": "write not; unequal is !=",
     **dict.fromkeys("−–", "write -"), **dict.fromkeys("‘’“”„", "write straight quotes"),
 }  # fmt: skip
 # Units of the bounds of windows, in s.
@@ -161,6 +162,8 @@ def hint_at(tokens: Sequence[Token], index: int) -> str:
         return found
     if previous and previous.text + token.text == "<>":
         return "unequal is !="
+    if previous and previous.text in ("and", "or") and token.text in _COMPARING:
+        return "repeat what is compared: x >= 0 and x <= 3"
     if token.kind == "symbol" and previous and previous.written in RESERVED:
         return f'{previous.written} is a reserved word; write a signal of that name as "{previous.written}"'
     return "something is missing before it"

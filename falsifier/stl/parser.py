@@ -292,8 +292,9 @@ class _Parser:
             return node
         if isinstance(node, expression.Name):
             return stl.Flag.of(node)
-        what = "a number" if isinstance(node, expression.Number) else "an expression"
-        hint = f"compare it, for example {node} >= 0"
+        is_number = isinstance(node, expression.Number)
+        what = "a number" if is_number else "an expression"
+        hint = f"compare it, for example {f'x == {node}' if is_number else f'{node} >= 0'}"
         if "=>" in self.text:
             hint += "; => is an implication, greater or equal is >="
         self._fail(f"expected a formula, got {what}, {node}", start, hint)
