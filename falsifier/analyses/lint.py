@@ -167,8 +167,8 @@ def _windows(problem: Problem) -> Iterator[LintFinding]:
         if part.window == Window(0.0, 0.0) and not isinstance(part, Until):
             text, advice = "the window contains only the present", f"leave it out: {part.children[0]}"
         elif part.signals and set(part.signals) <= still:
-            text = f"nothing changes {listed(part.signals)} over time, so the window does not matter"
-            advice = "leave the window out, or name a signal that changes"
+            text = f"nothing changes {listed(part.signals)} over time, so the operator does not matter"
+            advice = "leave the operator out, or name a signal that changes"
         else:
             continue
         yield LintFinding(problem.name, "window", str(part), text, advice)

@@ -88,7 +88,7 @@ _PATTERNS = {
     "never_together": "G[0,T] not (a and b)",
     "dwell": "G[0,T-t-h] ((not c and X c) -> X G[0,t] c), h one sampling step",
     "ramp_limit": "G[0,T] (abs(rate) <= limit), if a signal is the rate",
-    "order": "G[0,T] not later or (not later or first) U[0,T] first",
+    "order": "not (not first U[0,T] later)",
 }
 
 

@@ -125,7 +125,8 @@ def _unknown(name: str, info: ModelInfo) -> str:
     word = name.strip("'")
     if word in info:
         return f"unknown signal {name}: single quotes would be part of its name; write {name_text(word)}"
-    if items := [f"{word} is {v.literals[word]} of {v.name}" for v in info.variables if word in v.literals]:
+    item = word.rpartition(".")[2]  # also of Mode.Run
+    if items := [f"{item} is {v.literals[item]} of {v.name}" for v in info.variables if item in v.literals]:
         told = ", ".join(items[:3])
         return f"unknown signal {name!r}; formulas name items of enumerations by their numbers: {told}"
     if name in ("time", "t"):

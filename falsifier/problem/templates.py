@@ -95,7 +95,7 @@ class Rise(Template):
     signal: Term = _SIGNAL
     reference: Term = _REFERENCE
     reaches: Margin = Field(
-        "90%", description="Share of the reference to reach, as a percentage; required if down."
+        "90%", description="Share of the reference to reach, as a percentage; required if down, or below 0."
     )
     time: Duration = Field(description="Maximum time in s until it is reached.")
     direction: Literal["up", "down"] = Field("up", description="down: it falls to that share.")
@@ -105,10 +105,12 @@ class Rise(Template):
     def _is_percentage(self) -> "Rise":
         if share_of(self.reaches) is None:
             raise ValueError(f"reaches is a percentage of the reference such as '90%', got {self.reaches!r}")
-        if self.direction == "down" and "reaches" not in self.model_fields_set:
+        is_negative = isinstance(self.reference, float) and self.reference < 0
+        if (self.direction == "down" or is_negative) and "reaches" not in self.model_fields_set:
+            of = self.reference if isinstance(self.reference, float) else 20
             raise ValueError(
-                "with direction = 'down', state reaches as well: of a reference of 20, '110%' is a fall to "
-                "22, '90%' one to 18"
+                "with direction = 'down' or a negative reference, state reaches as well: "
+                f"'110%' of {of:.12g} is {tidy(1.1 * of):.12g}, '90%' of it {tidy(0.9 * of):.12g}"
             )
         return self
 
@@ -195,8 +197,8 @@ class Dwell(Template):
     def _limited(self) -> "Dwell":
         if self.at_least is None and self.at_most is None:
             raise ValueError("expected at_least, at_most or both, in s")
-        if self.at_least is not None and self.at_most is not None and self.at_least > self.at_most:
-            raise ValueError("at_least is more than at_most")
+        if self.at_least is not None and self.at_most is not None and self.at_least >= self.at_most:
+            raise ValueError("at_least must be less than at_most, as windows contain their ends")
         return self
 
     def _formula(self, clock: Clock) -> str:
@@ -265,10 +267,7 @@ class Order(Template):
     def _formula(self, clock: Clock) -> str:
         start, end = self._span(" and ".join(f"({c})" for c in self.conditions), clock)
         rest = window(0.0, end - start)
-        every = " and ".join(
-            f"(G{rest} (not ({later})) or (not ({later}) or ({first})) U{rest} ({first}))"
-            for first, later in pairwise(self.conditions)
-        )
+        every = " and ".join(f"not (not ({a}) U{rest} ({b}))" for a, b in pairwise(self.conditions))
         return every if start == 0 else f"G{window(start, start)} ({every})"
 
 

@@ -195,7 +195,9 @@ class _Search:
             case stl.Until():
                 left, right = operands
                 met = self._first(right.opposite, window)
-                yield from self.at(right, self._moved(spot.under(left.opposite), met))
+                note = f"after {left.opposite.text} held {_over(self._time(spot.sample), self._time(met))}"
+                spot = self._moved(spot, met)
+                yield from self.at(right, spot._replace(notes=(*spot.notes, note)))
             case stl.Implies() if demand.wanted:  # as a choice, a negated consequence would be a condition
                 yield from self.at(operands[1], spot.under(operands[0].opposite))
             case stl.Iff():

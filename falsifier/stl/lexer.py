@@ -15,6 +15,7 @@ from falsifier.errors import FormulaError
 
 FUNCTIONS = ("abs", "sqrt", "exp", "log", "sin", "cos", "min", "max")
 TEMPORAL = ("G", "F", "U", "X", "always", "eventually", "until", "next")
+_COMPARING = ("<", "<=", ">", ">=", "==", "!=")
 RESERVED = frozenset((*TEMPORAL, "not", "and", "or", "true", "false"))
 
 _IDENTIFIER = r"(?:[^\W\d]|\$)[\w$]*"
@@ -31,7 +32,7 @@ _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _DECIMAL_COMMA = re.compile(r"(?<![\w.])\d+(?=,\d)")
 # A window as other tools write it, up to the colon.
 _BOUNDS_WITH_COLON = re.compile(
-    r"(?:[GFU]|always|eventually|until|alw|ev)_?\s*\[\s*[\d.eE+-]+\s*(?:[um]?s|min|h)?\s*:\Z"
+    r"(?:[GFU]|always|eventually|until|alw|ev)_?\s*\[\s*[\d.eE+-]+\s*(?:[um]?s|min|h)?\s*[:;]\Z"
 )
 _SYMBOL = re.compile(r"<->|<=>|->|=>|<=|>=|==|!=|&&|\|\||[-+*/^<>!&|()\[\],]")
 _SPELLINGS = {
@@ -40,11 +41,13 @@ _SPELLINGS = {
 }  # fmt: skip
 _HINTS = {
     "=": "equality is ==, less or equal is <=",
-    "%": "write the number without a percent sign", "°": "write numbers without units; else quote the name",
+    "%": "write 5% of x as 0.05*x, and a number whose unit is % without the sign",
+    "°": "write numbers without units; else quote the name",
     "'": "a single quote opens a Modelica name and needs a second one",
     '"': "a double quote opens a name and needs a second one",
     "≤": "write <=", "≥": "write >=", "≠": "write !=", "¬": "write not", "∧": "write and", "∨": "write or",
-    "→": "write ->", "↔": "write <->", "□": "write G", "◇": "write F", "·": "write *", "~": "write not",
+    **dict.fromkeys("→⇒⟹", "write ->"), **dict.fromkeys("↔⇔", "write <->"), "□": "write G", "◇": "write F",
+    "·": "write *", "~": "write not; unequal is !=",
     **dict.fromkeys("−–", "write -"), **dict.fromkeys("‘’“”„", "write straight quotes"),
 }  # fmt: skip
 # Units of the bounds of windows, in s.
@@ -57,14 +60,23 @@ _PAST = (
 )
 # What was meant by a name; single capitals are operators only as they are written.
 _INSTEAD = {
-    **dict.fromkeys(("once", "since", "previous", *"OPSY"), _PAST.format("once", "F")),
+    **dict.fromkeys(
+        ("once", "since", *"OPSY"), _PAST.format("once", "F") + "; G (a -> once b) is not (not b U a)"
+    ),
     **dict.fromkeys(("historically", "H"), _PAST.format("historically", "G")),
-    **dict.fromkeys(("W", "weak_until", "weakuntil"), "a W b is ((a or b) U b) or G a"),
+    **dict.fromkeys(("W", "weak_until", "weakuntil"), "a W b is not (not b U not a)"),
     **dict.fromkeys(("R", "release"), "a R b is (b U (a and b)) or G b"),
     "globally": "write G or always", "finally": "write F or eventually", "implies": "write ->",
     "g": "operators are capital letters: write G", "f": "operators are capital letters: write F",
     "u": "operators are capital letters: write U", "alw": "write G or always", "ev": "write F or eventually",
     "iff": "write <->", "xor": "write not (a <-> b)",
+    **dict.fromkeys(("edge", "rise", "rising", "rose"), "a becomes true: not a and X a"),
+    **dict.fromkeys(
+        ("pre", "prev", "previous", "delay", "last", "mean", "average", "integral", "rms"),
+        "formulas know no values of other samples; let the model compute it",
+    ),
+    **dict.fromkeys(("derivative", "ddt", "diff"), "write der(x) if the model has it; else use ramp_limit"),
+    **dict.fromkeys(("if", "when", "whenever"), "if a then b is a -> b"),
     "pow": "write x^y", "ln": "the natural logarithm is log",
 }  # fmt: skip
 # What to do where one or two symbols stand in place of a formula, a signal or a number.
@@ -72,7 +84,8 @@ _MISPLACED = {
     "[]": "[] is written G or always", "<>": "<> is written F or eventually",
     **dict.fromkeys("[]", "write windows directly after G, F or U"),
     ")": "there is nothing between the parentheses, or one parenthesis too many",
-    "*": "write powers as x^y", "|": "write absolute values as abs(x)",
+    "*": "write powers as x^y", "+": "write numbers without a plus sign",
+    "|": "write absolute values as abs(x)",
 }  # fmt: skip
 JOIN = (
     "join two formulas with and, or, ->; numbers and signals with + - * /; write numbers without units, and "
@@ -147,6 +160,10 @@ def hint_at(tokens: Sequence[Token], index: int) -> str:
     pair = "".join(t.text for t in tokens[index : index + 2])
     if found := _MISPLACED.get(pair) or _MISPLACED.get(token.written):
         return found
+    if previous and previous.text + token.text == "<>":
+        return "unequal is !="
+    if previous and previous.text in ("and", "or") and token.text in _COMPARING:
+        return "repeat what is compared: x >= 0 and x <= 3"
     if token.kind == "symbol" and previous and previous.written in RESERVED:
         return f'{previous.written} is a reserved word; write a signal of that name as "{previous.written}"'
     return "something is missing before it"

@@ -190,6 +190,8 @@ class _Parser:
         if self._next.kind == "symbol" and self._next.position == token.end:
             if self._next.text == "(":
                 hint = lexer.hint_for(token) or did_you_mean(token.text, lexer.FUNCTIONS)
+                if self.tokens[self.index + 1].text == "t":
+                    hint = f"write signals without (t): {token.text}"
                 self._fail(f"unknown function {token.text!r}", token.position, hint)
             if self._next.text == "[":
                 self._fail(
@@ -209,7 +211,8 @@ class _Parser:
         is_pair = token.text in ("min", "max")
         if is_pair != (len(operands) > 1):
             wanted = "two or more expressions" if is_pair else "one expression"
-            self._fail(f"{token.text} expects {wanted}, got {len(operands)}", token.position, "check commas")
+            hint = "for the maximum over time, write G (x <= 3)" if is_pair else "check commas"
+            self._fail(f"{token.text} expects {wanted}, got {len(operands)}", token.position, hint)
         return expression.Call(cast(expression.Function, token.text), tuple(operands))
 
     def _close(self, opening: lexer.Token) -> None:
@@ -289,8 +292,9 @@ class _Parser:
             return node
         if isinstance(node, expression.Name):
             return stl.Flag.of(node)
-        what = "a number" if isinstance(node, expression.Number) else "an expression"
-        hint = f"compare it, for example {node} >= 0"
+        is_number = isinstance(node, expression.Number)
+        what = "a number" if is_number else "an expression"
+        hint = f"compare it, for example {f'x == {node}' if is_number else f'{node} >= 0'}"
         if "=>" in self.text:
             hint += "; => is an implication, greater or equal is >="
         self._fail(f"expected a formula, got {what}, {node}", start, hint)

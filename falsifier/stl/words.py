@@ -12,6 +12,7 @@ _IS: dict[stl.Comparison, str] = {
     "==": "equals",
     "!=": "differs from",
 }
+_BY = {"<": "less than", ">": "more than", ">=": "at least"}
 
 
 def in_words(formula: stl.Formula) -> str:
@@ -90,10 +91,10 @@ def _predicate(predicate: stl.Predicate) -> str:
     if isinstance(left, Number) and not isinstance(right, Number):
         left, operator, right = right, stl.MIRRORED[operator], left
     match left, operator:
-        case Call("abs", (Arithmetic("-", a, b),)), "<" | "<=":
+        case Call("abs", (Arithmetic("-", a, b),)), "<=":
             return f"{a} is within {right} of {b}"
-        case Call("abs", (Arithmetic("-", a, b),)), ">" | ">=":
-            return f"{a} differs from {b} by {'more than' if operator == '>' else 'at least'} {right}"
+        case Call("abs", (Arithmetic("-", a, b),)), "<" | ">" | ">=":
+            return f"{a} differs from {b} by {_BY[operator]} {right}"
     return f"{left} {_IS[operator]} {right}"
 
 
@@ -102,7 +103,7 @@ def _when(window: stl.Window | None, *, later: bool, always: bool = False) -> st
     absolute, open_ended, soon = (
         ("at all times", "from then on", "throughout")
         if always
-        else ("at some time", "at some later time", "at some time within")
+        else ("at some time", "at some time from then on", "at some time within")
     )
     if window is None:
         return open_ended if later else absolute

@@ -271,8 +271,9 @@ def test_items_of_enumerations_may_be_named() -> None:
     assert kept(first) == kept(str(number)) == [("in_Enumeration", number)]
     with pytest.raises(SpecError, match=f"expected a number or one of {first}, .*, got 'nothing'"):
         kept("nothing")
-    with pytest.raises(SpecError, match=f"unknown signal '{first}'; .*: {first} is {number} of in_Enum"):
-        Problem.from_fmu(fixture("Echo_2"), f"G (in_Enumeration == {first})")
+    for name in (first, f"Kind.{first}"):
+        with pytest.raises(SpecError, match=f"unknown signal '{name}'; .*: {first} is {number} of in_Enum"):
+            Problem.from_fmu(fixture("Echo_2"), f"G (in_Enumeration == {name})")
 
 
 def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_the_reason_is_told(

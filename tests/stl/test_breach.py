@@ -79,7 +79,7 @@ def test_a_negated_alternative_is_a_condition(formula: str) -> None:
         ("error <= 3 U[0,5] load <= -1",
          "load <= -1 held at no time from 0 to 5 s; nearest was load = -0.0259 kN at 3 s"),
         ("not (error <= 30 U[0,5] load <= 0.035)",
-         "load > 0.035 was violated at 3 s: load = -0.0259 kN; after error <= 30 held at 0 s (error = 0 mm)"),
+         "load > 0.035 was violated at 3 s: load = -0.0259 kN; after error <= 30 held from 0 to 3 s"),
         ("not (F[0,5] error >= 9)", "error < 9 was violated from 3 to 5 s: error = 9.4 mm at 4 s"),
         ("G[0,6] not (error >= 9 and load <= 0.5)",
          "alternative 1 of 2: error < 9 was violated from 3 to 5 s: error = 9.4 mm at 4 s; "

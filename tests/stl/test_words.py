@@ -11,12 +11,13 @@ from tests.stl.randoms import random_formula
     [
         ("G[0,1234567.8] (x > 1)", "At all times from 0 to 1234567.8 s, x is above 1."),
         ("G[0.1234567,0.1234568] b", "At all times from 0.1234567 to 0.1234568 s, b is true."),
-        ("G F (x >= 1)", "At all times, at some later time, x is at least 1."),
+        ("G F (x >= 1)", "At all times, at some time from then on, x is at least 1."),
         ("F G b", "At some time, from then on, b is true."),
         ("G[4,4] (not b)", "At 4 s, b is false."),
         ("3 >= x", "x is at most 3."),
         ("1 <= x <= 3", "x is between 1 and 3."),
         ("abs(gear - 1) <= 0.5", "gear is within 0.5 of 1."),
+        ("abs(gear - 1) < 0.5", "gear differs from 1 by less than 0.5."),
         ("abs(gear - 1) > 0.5", "gear differs from 1 by more than 0.5."),
         (
             "G[0,65] F[0,30] G[0,5] (y5 - y4 >= 8)",
