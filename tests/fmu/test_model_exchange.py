@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from tests.fmu.fixtures import ME, isolated, ramp, run
+from tests.fmu.fixtures import ME, isolated, ramp, run, runner
 
 LAGS = ["Lag_1me", "Lag_2", "Lag_3"]
 TICKERS = ["Ticker_1me", "Ticker_2", "Ticker_3"]
@@ -48,6 +48,16 @@ def test_time_events_are_met_exactly(name: str) -> None:
     assert got["count"].tolist() == (ticks + 1).tolist()
     exact = 0.25 * ticks * (ticks - 1) / 2 + 0.5 * ticks * (got.times - 0.5 * ticks)
     np.testing.assert_allclose(got["x"], exact, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["Strict_2", "Strict_3"])
+def test_new_nominal_values_are_asked_for_after_events_and_sizes_only_before_the_simulation(
+    name: str,
+) -> None:
+    model = isolated(name, ME)
+    for outputs in (("count",), ("count", "x")):
+        assert run(model, outputs, stop=3.0)["count"][-1] == 7.0
+    assert not runner(model)._repeats
 
 
 def test_discrete_inputs_change_at_events_only() -> None:
