@@ -96,6 +96,13 @@ def test_state_events_are_located(name: str) -> None:
     assert got["bounces"].tolist() == exact[:, 2].tolist()
 
 
+@pytest.mark.parametrize("name", ["Floor_2", "Floor_3"])
+def test_a_step_to_where_event_indicators_are_undefined_is_shortened(name: str) -> None:
+    """The first step, of 0.7 s, would end 1.4 m below the floor."""
+    got = run(isolated(name, ME), ("h",), stop=1.4, interval=0.7, parameters={"e": 0.8})
+    np.testing.assert_allclose(got["h"], [ball(t, e=0.8)[0] for t in got.times], atol=1e-8)
+
+
 def test_stiff_models_are_solved() -> None:
     """x' = -1e6 (x - cos t) - sin t: an explicit method would need three million steps."""
     got = run(isolated("Stiff_2", ME), ("x",), stop=10.0, interval=0.05)

@@ -130,12 +130,15 @@ static double spacing(double x)
     return nextafter(x, INFINITY) - x;
 }
 
-/* Shorten the step until its error is within the tolerance. */
+/* Shorten the step until its error is within the tolerance; the event indicators at its end are new_z. */
 static struct outcome accepted_step(struct solver *s, double *h)
 {
     double tried = *h;
     for (;;) {
         struct trial t = try_step(s, *h);
+        /* FMUs may discard a step here, too. */
+        if (t.status <= 1 && t.error <= 1.0)
+            t.status = get_indicators(s, s->new_z);
         if (t.status > 2)
             return (struct outcome){t.status, STEPPING};
         double factor = MIN_FACTOR;
@@ -243,8 +246,6 @@ static struct outcome step_towards(struct solver *s, double target, int *wants_e
 {
     double h = step_size(s, target);
     struct outcome o = accepted_step(s, &h);
-    if (o.where == DONE)
-        o = checked(get_indicators(s, s->new_z), EVENT);
     *wants_event = o.where == DONE && changes_sign(s, s->new_z);
     if (*wants_event)
         o = stop_at_event(s, &h);
