@@ -80,8 +80,8 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
             raise SpecError(f"{name!r} is a string, and formulas compare numbers")
         if info[name].is_clocked:
             raise SpecError(
-                f"{name!r} belongs to an input clock, and these never tick here, so it would keep its start "
-                "value; name a variable without one, or export the model without this clock"
+                f"{name!r} changes only when a clock ticks, which is not simulated here; name a variable "
+                "without a clock, or export the model without this one"
             )
     # One input has one name, whose values are known at every sample without asking the model.
     variables = [info[name] for name in formula.signals]

@@ -336,7 +336,9 @@ def test_items_and_truth_values_are_given_by_their_names() -> None:
 
 def test_what_belongs_to_a_clock_that_never_ticks_cannot_be_required() -> None:
     info = ModelInfo("m", variables=(Variable("sampled", causality="output", is_clocked=True),))
-    with pytest.raises(SpecError, match=r"'sampled' belongs to an input clock, .* name a variable without"):
+    with pytest.raises(
+        SpecError, match=r"'sampled' changes only when a clock ticks, .* name a variable without"
+    ):
         parse_requirement("G (sampled > 1)", info, Experiment(1.0, 0.1, ()))
 
 

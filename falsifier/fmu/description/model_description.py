@@ -215,7 +215,7 @@ def _notes(
     if clocks := tuple(input_clocks(root).values()):
         said.append(f"input clocks are ignored, so they never tick: {first_few(clocks)}")
     if ignored := [v.name for v in variables if v.is_clocked]:
-        said.append(f"variables of input clocks are ignored: {first_few(ignored)}")
+        said.append(f"variables of clocks are ignored: {first_few(ignored)}")
     if binary := [element.attrib["name"] for element in root.findall("ModelVariables/Binary")]:
         said.append(f"binary variables are ignored: {first_few(binary)}")
     if aliases := [f"{v.name} = {v.alias_of}" for v in variables if v.alias_of and v.causality == "input"]:
