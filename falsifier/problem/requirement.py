@@ -78,6 +78,11 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
             raise SpecError(_unknown(name, info))
         if info[name].kind == "string":
             raise SpecError(f"{name!r} is a string, and formulas compare numbers")
+        if info[name].is_clocked:
+            raise SpecError(
+                f"{name!r} changes only when a clock ticks, which is not simulated here; name a variable "
+                "without a clock, or export the model without this one"
+            )
     # One input has one name, whose values are known at every sample without asking the model.
     variables = [info[name] for name in formula.signals]
     numbers = [Flag.of(Name(v.name)) for v in variables if v.kind != "boolean" and v.limits != (0.0, 1.0)]

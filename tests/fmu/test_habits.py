@@ -137,7 +137,7 @@ def test_clocks_and_binary_variables_are_ignored_and_named() -> None:
     assert [v.name for v in info.outputs] == ["y"]
     assert info.notes == (
         "input clocks are ignored, so they never tick: request, every",
-        "variables of input clocks are ignored: command, sampled",
+        "variables of clocks are ignored: command, sampled",
         "binary variables are ignored: image, frame",
     )
     model = isolated("ClocksAndBinary_3")

@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from tests.fmu.fixtures import ME, isolated, ramp, run
+from tests.fmu.fixtures import ME, isolated, ramp, run, runner
 
 LAGS = ["Lag_1me", "Lag_2", "Lag_3"]
 TICKERS = ["Ticker_1me", "Ticker_2", "Ticker_3"]
@@ -50,6 +50,16 @@ def test_time_events_are_met_exactly(name: str) -> None:
     np.testing.assert_allclose(got["x"], exact, atol=1e-9)
 
 
+@pytest.mark.parametrize("name", ["Strict_2", "Strict_3"])
+def test_new_nominal_values_are_asked_for_after_events_and_sizes_only_before_the_simulation(
+    name: str,
+) -> None:
+    model = isolated(name, ME)
+    for outputs in (("count",), ("count", "x")):
+        assert run(model, outputs, stop=3.0)["count"][-1] == 7.0
+    assert not runner(model)._repeats
+
+
 def test_discrete_inputs_change_at_events_only() -> None:
     """Ticker samples u, a continuous input; driven by a step it sees the value after the step."""
     step = Signal((0.0, 0.5), (1.0, 3.0), "constant")
@@ -84,6 +94,13 @@ def test_state_events_are_located(name: str) -> None:
     np.testing.assert_allclose(got["h"], exact[:, 0], atol=1e-8)
     np.testing.assert_allclose(got["v"], exact[:, 1], atol=1e-8)
     assert got["bounces"].tolist() == exact[:, 2].tolist()
+
+
+@pytest.mark.parametrize("name", ["Floor_2", "Floor_3"])
+def test_a_step_to_where_event_indicators_are_undefined_is_shortened(name: str) -> None:
+    """The first step, of 0.7 s, would end 1.4 m below the floor."""
+    got = run(isolated(name, ME), ("h",), stop=1.4, interval=0.7, parameters={"e": 0.8})
+    np.testing.assert_allclose(got["h"], [ball(t, e=0.8)[0] for t in got.times], atol=1e-8)
 
 
 def test_stiff_models_are_solved() -> None:

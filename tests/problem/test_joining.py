@@ -335,6 +335,14 @@ def test_items_and_truth_values_are_given_by_their_names() -> None:
             search_space(section, {}, info, 1.0, ModelChanges())
 
 
+def test_what_belongs_to_a_clock_that_never_ticks_cannot_be_required() -> None:
+    info = ModelInfo("m", variables=(Variable("sampled", causality="output", is_clocked=True),))
+    with pytest.raises(
+        SpecError, match=r"'sampled' changes only when a clock ticks, .* name a variable without"
+    ):
+        parse_requirement("G (sampled > 1)", info, Experiment(1.0, 0.1, ()))
+
+
 def test_strings_are_no_numbers() -> None:
     variables = Variable("out", "string", "output"), Variable("in", "string", "input"), Variable("x")
     info = ModelInfo("m", variables=variables)

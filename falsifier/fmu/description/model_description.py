@@ -51,6 +51,7 @@ class Description:
     event_mode: bool = False  # whether the co-simulation interface supports event mode (FMI 3)
     needs_tool: tuple[Interface, ...] = ()  # names of interfaces that need the exporting tool to be installed
     saves_state: tuple[Interface, ...] = ()  # names of interfaces whose state can be saved and restored
+    once: tuple[Interface, ...] = ()  # names of interfaces of which a process can have one instance only
 
     @property
     def major(self) -> int:
@@ -123,7 +124,7 @@ def _parse(root: Element, version: str) -> Description:
     identifiers = {interface: stated["modelIdentifier"] for interface, stated in interfaces.items()}
     if folder := next((each for each in identifiers.values() if re.search(r"[/\\]", each)), None):
         raise ValueError(f"modelIdentifier = {folder!r}: expected the name of a library, without a folder")
-    needs_tool = tuple(i for i, stated in interfaces.items() if is_true(stated.get("needsExecutionTool")))
+    needs_tool = _declaring(interfaces, "needsExecutionTool")
     tool = root.get("generationTool", "")
     for name in (root.attrib["modelName"], *identifiers.values(), tool):
         check_length(name)
@@ -153,10 +154,16 @@ def _parse(root: Element, version: str) -> Description:
         indicators=whole(root.attrib, "numberOfEventIndicators", "0"),
         event_mode=is_true(interfaces.get("co-simulation", {}).get("hasEventMode")),
         needs_tool=needs_tool,
-        saves_state=tuple(
-            i for i, stated in interfaces.items() if any(is_true(stated.get(name)) for name in _SAVING)
-        ),
+        saves_state=_declaring(interfaces, *_SAVING),
+        once=_declaring(interfaces, "canBeInstantiatedOnlyOncePerProcess"),
     )
+
+
+def _declaring(
+    interfaces: Mapping[Interface, Mapping[str, str]], *capabilities: str
+) -> tuple[Interface, ...]:
+    """Return the interfaces that declare one of these capabilities."""
+    return tuple(i for i, stated in interfaces.items() if any(is_true(stated.get(c)) for c in capabilities))
 
 
 def _number_of_states(root: Element, major: int) -> int:
@@ -208,7 +215,7 @@ def _notes(
     if clocks := tuple(input_clocks(root).values()):
         said.append(f"input clocks are ignored, so they never tick: {first_few(clocks)}")
     if ignored := [v.name for v in variables if v.is_clocked]:
-        said.append(f"variables of input clocks are ignored: {first_few(ignored)}")
+        said.append(f"variables of clocks are ignored: {first_few(ignored)}")
     if binary := [element.attrib["name"] for element in root.findall("ModelVariables/Binary")]:
         said.append(f"binary variables are ignored: {first_few(binary)}")
     if aliases := [f"{v.name} = {v.alias_of}" for v in variables if v.alias_of and v.causality == "input"]:

@@ -1,5 +1,6 @@
 """Checking the components and connections of a system, before anything is simulated."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -56,6 +57,13 @@ def make_network(
     for together in (names[first:last] for first, last in loops):
         verb = "repeats its" if len(together) == 1 else "repeat their"
         notes.append(f"{', '.join(together)} {verb} steps until the outputs no longer change")
+    once = Counter(m.sha256 for m in members if m.interface in m.description.once)
+    if twice := [m.name for m in members if once[m.sha256] > 1]:
+        coupling = replace(coupling, isolation="each")
+        notes.append(
+            f"each component has a process of its own, because {' and '.join(twice)} are one FMU, which can "
+            "be instantiated only once per process, as it declares"
+        )
     description, places = merged(name, members, links, frame, [*notes, *joiner.notes])
     return Network(name, members, links, order, loops, coupling, description, places)
 

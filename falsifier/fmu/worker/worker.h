@@ -61,6 +61,7 @@ struct saving {
 /* One FMU: what the request says of it, its library, and its instance with what surrounds it. */
 struct fmu {
     int major, is_model_exchange, logging, event_mode, saves_state;
+    int is_repeated; /* steps are done again from a saved state */
     size_t states, indicators;
     char *library, *identifier, *name, *token, *resources;
     void *module, *instance, *state;

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from falsifier.core.model import Interface
 from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
-from falsifier.fmu import Connection, Coupling
+from falsifier.fmu import Component, Connection, Coupling
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ME, ramp
 from tests.fmu.small_systems import LOOP, run, sampled_loop, solved, system
@@ -124,3 +125,14 @@ def test_the_component_and_the_time_of_a_failure_are_told(misdeed: int, said: st
     with pytest.raises(SimulationError, match=rf"^wild: {said} at t = 0\.[45] s"):
         run(model, "plant.x", parameters={"wild.misdeed": misdeed})
     assert run(model, "wild.x")["wild.x"][-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("interface", ["co-simulation", ME])
+@pytest.mark.parametrize("name", ["Strict_2", "Strict_3"])
+def test_steps_that_are_repeated_are_not_promised_to_be_final(name: str, interface: Interface) -> None:
+    """The FMU returns early for its events (FMI 3), or is told of each step of the solver."""
+    ticker = Component(fixtures.path(name), interface=interface)
+    links = {"ticker.u": "gain.y", "gain.measured": "ticker.x"}
+    model = system({"ticker": ticker, "gain": "Gain_2"}, links, Coupling(loops="iterate"))
+    first, again = (run(model, "ticker.count", "ticker.x", interval=0.2, stop=2.0) for _ in range(2))
+    assert first["ticker.count"][-1] == 5.0 and first["ticker.x"].tolist() == again["ticker.x"].tolist()

@@ -10,6 +10,7 @@ from falsifier.core.signals import Signal
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import Component, Connection, Coupling
 from tests.campaigns.test_kill import children
+from tests.fmu.fixtures import altered, path
 from tests.fmu.small_systems import LINEAR, LOOP, component, pids, run, solved, system
 from tests.fmu.support import CRASH, HANG
 from tests.patience import wait_until
@@ -44,6 +45,19 @@ def test_trajectories_are_those_of_one_process_to_the_last_digit(
         found.append([[each[name] for name in outputs] for each in runs])
         model.close()
     np.testing.assert_array_equal(found[0], found[1])
+
+
+@pytest.mark.parametrize("second", ["a.fmu", "b.fmu"])
+def test_an_fmu_that_a_process_can_have_only_once_gets_one_per_component(second: str, tmp_path: Path) -> None:
+    once = b'<CoSimulation canBeInstantiatedOnlyOncePerProcess="true" '
+    for name, known in (("a.fmu", "Lag_2"), ("b.fmu", "Lead_2")):
+        altered(path(known), tmp_path / name, lambda x: x.replace(b"<CoSimulation ", once), ending=".xml")
+    parts = {"a": Component(tmp_path / "a.fmu"), "b": Component(tmp_path / second)}
+    model = system(parts, {"b.u": "a.y"})
+    is_twice = second == "a.fmu"
+    assert model.order.network.coupling.isolation == ("each" if is_twice else "together")
+    assert ("because a and b are one FMU" in model.info.notes[-1]) == is_twice
+    assert run(model, "b.x", signals={"a.u": Signal((0.0,), (1.0,))})["b.x"][-1] > 0.0
 
 
 def test_libraries_that_must_be_loaded_again_cost_no_process_of_the_master() -> None:

@@ -58,7 +58,7 @@ static struct outcome advance_3(struct fmu *fmu, double start, double end, int *
         uint8_t event = 0, terminate = 0, early = 0;
         double reached = end;
         unsigned status = ((step_3)fmu->step.do_step)(
-            fmu->instance, time, end - time, 1, &event, &terminate, &early, &reached);
+            fmu->instance, time, end - time, !fmu->is_repeated, &event, &terminate, &early, &reached);
         *ends = 0;
         if (status > 1)
             return (struct outcome){status, STEPPING};
@@ -104,7 +104,7 @@ struct outcome do_step(struct fmu *fmu, double start, double end, int *ends)
         return advance_3(fmu, start, end, ends);
     *ends = 0;
     unsigned status = fmu->major == 2
-                          ? ((step_2)fmu->step.do_step)(fmu->instance, start, end - start, 1)
+                          ? ((step_2)fmu->step.do_step)(fmu->instance, start, end - start, !fmu->is_repeated)
                           : ((step_1)fmu->step.do_step)(fmu->instance, start, end - start, 1);
     return fmu->major == 2 && status == DISCARD ? discarded_2(fmu, end, ends) : checked(status, STEPPING);
 }

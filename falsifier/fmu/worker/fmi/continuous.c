@@ -9,6 +9,8 @@
 #define MOST_ROUNDS 1000
 /* Maximum number of states, and of event indicators: an FMU may report anything. */
 #define MOST_VALUES 100000
+/* Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7). */
+#define ABSOLUTE_SHARE 0.01
 
 typedef unsigned (*get_size)(void *, size_t *);
 typedef unsigned (*completed_1)(void *, char *);
@@ -55,7 +57,7 @@ static size_t size_of(struct fmu *fmu, const char *name)
     return size;
 }
 
-/* Ask for the numbers of states and event indicators, which FMI 3 reports only at run time. */
+/* Ask for the numbers of states and event indicators, which FMI 3 reports only at run time, before a simulation. */
 void get_sizes(struct fmu *fmu)
 {
     if (fmu->major == 3) {
@@ -68,10 +70,16 @@ void get_sizes(struct fmu *fmu)
         give_up("%lld event indicators; expected 0 to %d", (long long)fmu->indicators, MOST_VALUES);
 }
 
-unsigned get_nominals(const struct solver *s, double *nominals)
+/* Weigh the states by their nominal values, which events may change. */
+unsigned weigh_states(struct solver *s)
 {
     const char *name = s->fmu->major == 1 ? "GetNominalContinuousStates" : "GetNominalsOfContinuousStates";
-    return s->n ? ((get_vector)fmu_required(s->fmu, name))(s->fmu->instance, nominals, s->n) : 0;
+    for (size_t i = 0; i < s->n; i++)
+        s->weights[i] = 1.0;
+    unsigned status = s->n ? ((get_vector)fmu_required(s->fmu, name))(s->fmu->instance, s->weights, s->n) : 0;
+    for (size_t i = 0; i < s->n; i++)
+        s->weights[i] = ABSOLUTE_SHARE * s->plan->solver_tolerance * (s->weights[i] > 0.0 ? s->weights[i] : 1.0);
+    return status;
 }
 
 unsigned get_states(const struct solver *s)
@@ -134,10 +142,10 @@ unsigned complete_step(const struct solver *s, int *wants_event, int *ends)
         status = ((completed_1)s->f.completed_step)(instance, &event);
         *wants_event = event != 0;
     } else if (s->fmu->major == 2) {
-        status = ((completed_2)s->f.completed_step)(instance, 1, wants_event, ends);
+        status = ((completed_2)s->f.completed_step)(instance, !s->fmu->is_repeated, wants_event, ends);
     } else {
         uint8_t event = 0, terminate = 0;
-        status = ((completed_3)s->f.completed_step)(instance, 1, &event, &terminate);
+        status = ((completed_3)s->f.completed_step)(instance, !s->fmu->is_repeated, &event, &terminate);
         *wants_event = event != 0;
         *ends = terminate != 0;
     }
@@ -145,7 +153,7 @@ unsigned complete_step(const struct solver *s, int *wants_event, int *ends)
 }
 
 struct update {
-    int again, terminate, states_changed;
+    int again, terminate, nominals_changed, states_changed;
 };
 
 /* Do one round of event iteration and store the next time event. */
@@ -158,20 +166,20 @@ static unsigned update(struct solver *s, struct update *u)
     if (s->fmu->major == 1) {
         struct event_info_1 i = {0};
         status = ((update_1)s->f.update)(instance, 0, &i);
-        *u = (struct update){!i.converged, i.terminate != 0, i.states_changed != 0};
+        *u = (struct update){!i.converged, i.terminate != 0, 0, i.states_changed != 0};
         defined = i.has_next_time != 0;
         next_time = i.next_time;
     } else if (s->fmu->major == 2) {
         struct event_info_2 i = {0};
         status = ((update_2)s->f.update)(instance, &i);
-        *u = (struct update){i.again != 0, i.terminate != 0, i.states_changed != 0};
+        *u = (struct update){i.again != 0, i.terminate != 0, i.nominals_changed != 0, i.states_changed != 0};
         defined = i.has_next_time != 0;
         next_time = i.next_time;
     } else {
         uint8_t again = 0, terminate = 0, nominals = 0, states = 0, has_next_time = 0;
         status = ((update_discrete_states_3)s->f.update)(
             instance, &again, &terminate, &nominals, &states, &has_next_time, &next_time);
-        *u = (struct update){again != 0, terminate != 0, states != 0};
+        *u = (struct update){again != 0, terminate != 0, nominals != 0, states != 0};
         defined = has_next_time != 0;
     }
     s->next_event = defined ? next_time : INFINITY;
@@ -181,8 +189,8 @@ static unsigned update(struct solver *s, struct update *u)
 /* Iterate events until nothing changes, enter continuous time. */
 struct outcome settle_events(struct solver *s)
 {
-    struct update u = {1, 0, 0};
-    int any_change = 0;
+    struct update u = {1, 0, 0, 0};
+    int other_nominals = 0, any_change = 0;
     for (int round = 0; u.again; round++) {
         if (round == MOST_ROUNDS)
             return (struct outcome){0, STUCK};
@@ -191,9 +199,12 @@ struct outcome settle_events(struct solver *s)
             o.where = TERMINATED;
         if (o.where != DONE)
             return o;
+        other_nominals = other_nominals || u.nominals_changed;
         any_change = any_change || u.states_changed;
     }
     unsigned status = s->fmu->major > 1 ? s->f.enter_continuous_time_mode(s->fmu->instance) : 0;
+    if (status <= 1 && other_nominals)
+        status = weigh_states(s);
     if (status <= 1 && any_change)
         status = get_states(s);
     return status > 1 ? checked(status, EVENT) : refresh(s);

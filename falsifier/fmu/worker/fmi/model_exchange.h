@@ -47,7 +47,7 @@ struct trial {
 /* continuous.c */
 void find_functions(struct solver *s);
 void get_sizes(struct fmu *fmu);
-unsigned get_nominals(const struct solver *s, double *nominals);
+unsigned weigh_states(struct solver *s);
 unsigned get_states(const struct solver *s);
 unsigned derive(const struct solver *s, double time, const double *x, double *derivatives);
 unsigned get_indicators(const struct solver *s, double *z);

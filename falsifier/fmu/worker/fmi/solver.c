@@ -21,8 +21,6 @@
 #define MAX_FACTOR 5.0
 /* Events within one output interval after which the FMU is considered stuck (Zeno behaviour). */
 #define MOST_EVENTS 10000
-/* Absolute tolerance of a state: this share of the relative one, times its nominal value (FMI 2.0.4, 2.2.7). */
-#define ABSOLUTE_SHARE 0.01
 
 /* Numbers that the FMU writes end where accessible memory ends: an FMU that writes past them crashes there. */
 static double *guarded(size_t count)
@@ -35,11 +33,11 @@ static double *guarded(size_t count)
 
 void prepare_solver(struct fmu *fmu, struct plan *plan)
 {
-    get_sizes(fmu);
-    int is_known =
-        fmu->solver && fmu->solver->n == fmu->states && fmu->solver->indicators == fmu->indicators;
-    if (!is_known)
+    int is_known = fmu->solver != NULL;
+    if (!is_known) {
+        get_sizes(fmu);
         fmu->solver = need(1, sizeof *fmu->solver);
+    }
     struct solver *s = fmu->solver;
     s->fmu = fmu;
     s->plan = plan;
@@ -73,17 +71,11 @@ static struct outcome start(struct solver *s)
     s->next_step = s->plan->max_step;
     s->next_event = INFINITY;
     s->implicit = s->stiff_hits = s->other_hits = s->events = s->jacobian_known = 0;
-    for (size_t i = 0; i < s->n; i++) {
+    for (size_t i = 0; i < s->n; i++)
         s->x[i] = s->new_x[i] = 0.0;
-        s->weights[i] = 1.0;
-    }
     for (size_t i = 0; i < s->indicators; i++)
         s->z[i] = s->new_z[i] = 0.0;
-    struct outcome o = checked(get_nominals(s, s->weights), GETTING);
-    for (size_t i = 0; i < s->n; i++) {
-        double nominal = s->weights[i] > 0.0 ? s->weights[i] : 1.0;
-        s->weights[i] = ABSOLUTE_SHARE * s->plan->solver_tolerance * nominal;
-    }
+    struct outcome o = checked(weigh_states(s), GETTING);
     return o.where == DONE ? checked(get_states(s), GETTING) : o;
 }
 
@@ -138,12 +130,15 @@ static double spacing(double x)
     return nextafter(x, INFINITY) - x;
 }
 
-/* Shorten the step until its error is within the tolerance. */
+/* Shorten the step until its error is within the tolerance; the event indicators at its end are new_z. */
 static struct outcome accepted_step(struct solver *s, double *h)
 {
     double tried = *h;
     for (;;) {
         struct trial t = try_step(s, *h);
+        /* FMUs may discard a step here, too. */
+        if (t.status <= 1 && t.error <= 1.0)
+            t.status = get_indicators(s, s->new_z);
         if (t.status > 2)
             return (struct outcome){t.status, STEPPING};
         double factor = MIN_FACTOR;
@@ -251,8 +246,6 @@ static struct outcome step_towards(struct solver *s, double target, int *wants_e
 {
     double h = step_size(s, target);
     struct outcome o = accepted_step(s, &h);
-    if (o.where == DONE)
-        o = checked(get_indicators(s, s->new_z), EVENT);
     *wants_event = o.where == DONE && changes_sign(s, s->new_z);
     if (*wants_event)
         o = stop_at_event(s, &h);
@@ -325,7 +318,7 @@ static size_t move(const struct solver *s, char *kept, int is_kept)
 {
     const struct inputs *plain = &s->plan->inputs, *held = &s->plan->held;
     const struct { void *at; size_t count; } vectors[] = {
-        {s->x, s->n}, {s->stages[0], s->n}, {s->z, s->indicators},
+        {s->weights, s->n}, {s->x, s->n}, {s->stages[0], s->n}, {s->z, s->indicators},
         {plain->current, plain->ports.count}, {held->current, held->ports.count},
     };
     size_t total = 0;

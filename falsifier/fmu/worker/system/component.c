@@ -39,6 +39,7 @@ static void forget_all(struct component *c)
 static void take_plan(struct component *c)
 {
     forget_step(c);
+    c->fmu.is_repeated = c->is_iterated;
     if (c->fmu.is_model_exchange)
         prepare_solver(&c->fmu, &c->plan);
     else
