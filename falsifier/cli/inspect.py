@@ -15,7 +15,7 @@ from falsifier.cli.output import as_shown, say
 from falsifier.context.simulink import read_diagram
 from falsifier.context.values import SIMULINK
 from falsifier.core.experiment import Experiment
-from falsifier.core.files import absent, bundled
+from falsifier.core.files import absent, bundled, write_whole
 from falsifier.core.literals import shell_word
 from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
@@ -98,7 +98,7 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
         raise SpecError(f"{path} already exists: choose another --out, or delete it first")
     text = _starter(fmus, path)
     problem_of_starter(text, path)
-    path.write_text(text, encoding="utf-8")
+    write_whole(path, text)
     command = f"falsifier run {shell_word(path)}"
     say(f"{path} written. Enter the actual ranges and the requirement, then: {command}")
 

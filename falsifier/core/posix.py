@@ -11,8 +11,9 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import FrameType
 
 from falsifier.errors import MachineError
 
@@ -183,6 +184,32 @@ class WatchedProgram:
         for descriptor in (self._requests, self._replies, self._life):
             if descriptor is not None:
                 os.close(descriptor)
+
+
+@contextlib.contextmanager
+def undisturbed() -> Iterator[None]:
+    """Complete a short step before Ctrl-C, or the end of a job, takes effect; the second one does at once."""
+    is_over, held = False, list[int]()
+    handlers: dict[int, Callable[[int, FrameType | None], object]] = {}
+
+    def hold(number: int, frame: FrameType | None) -> None:
+        held.append(number)
+        if is_over or len(held) > 1:
+            handlers[number](number, frame)
+
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        handler = signal.getsignal(number)
+        if callable(handler) and threading.current_thread() is threading.main_thread():
+            handlers[number] = handler
+            signal.signal(number, hold)
+    try:
+        yield
+    finally:
+        is_over = True
+        for held_back, handler in handlers.items():
+            signal.signal(held_back, handler)
+        if len(held) == 1:
+            handlers[held[0]](held[0], None)
 
 
 def _spawn(command: Sequence[str], environment: Mapping[str, str], places: Mapping[int, int]) -> int:

@@ -188,9 +188,12 @@ def _start_silent_tracker() -> None:
     command has ended, and the user could do nothing about it.
     """
     sys.warnoptions.append(_TRACKER_FILTER)  # the tracker is started with the options of this interpreter
+    # It is to outlive the end of a session, like Ctrl-C, which it blocks itself; it keeps what is blocked.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGHUP,))
     try:
         ensure_running()
     finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
         sys.warnoptions.remove(_TRACKER_FILTER)
 
 

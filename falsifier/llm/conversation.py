@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 from falsifier.core.literals import printable
+from falsifier.core.posix import undisturbed
 from falsifier.core.words import counted, shortened, without_full_stop
 from falsifier.errors import ChatError, ContextExceededError, FalsifierError, written
 from falsifier.llm.messages import (
@@ -70,26 +71,27 @@ def converse(
                 raise
             problems.append(str(error))
             break
-        exchange = Exchange(llm=chat.llm, messages=request.messages, reply=reply)
-        try:
-            value = read(_usable_text(reply))
-        except RejectedReplyError as rejection:
-            problem = str(rejection)
-            if reply.finish_reason == "length":
-                problem = f"{_CUT_OFF} ({problem}); reason less and give a shorter reply"
-            elif reply.finish_reason.startswith(TOOL_CALL):
-                problem = f"it is a {reply.finish_reason} in place of an answer ({problem})"
-            on_exchange(exchange.model_copy(update={"problem": problem}))
-            problems.append(problem)
-            request = _asked_again(request, reply, problem)
-        except Exception as error:
-            # A defect, but the reply has been paid for: it is recorded first.
-            on_exchange(exchange.model_copy(update={"problem": f"{type(error).__name__}: {error}"}))
-            raise
-        else:
-            on_exchange(exchange)
-            chat.accepted(request, reply)
-            return value
+        with undisturbed():  # it has been paid for
+            exchange = Exchange(llm=chat.llm, messages=request.messages, reply=reply)
+            try:
+                value = read(_usable_text(reply))
+            except RejectedReplyError as rejection:
+                problem = str(rejection)
+                if reply.finish_reason == "length":
+                    problem = f"{_CUT_OFF} ({problem}); reason less and give a shorter reply"
+                elif reply.finish_reason.startswith(TOOL_CALL):
+                    problem = f"it is a {reply.finish_reason} in place of an answer ({problem})"
+                on_exchange(exchange.model_copy(update={"problem": problem}))
+                problems.append(problem)
+                request = _asked_again(request, reply, problem)
+            except Exception as error:
+                # A defect, but the reply is recorded first.
+                on_exchange(exchange.model_copy(update={"problem": f"{type(error).__name__}: {error}"}))
+                raise
+            else:
+                chat.accepted(request, reply)  # first, as the disk of the run may be full
+                on_exchange(exchange)
+                return value
     raise NoValidReplyError(
         f"{chat.llm} gave no valid reply in {counted(len(problems), 'attempt')}; rejected because: "
         f"{' | '.join(dict.fromkeys(problems))}{_advice(problems[-1])}"

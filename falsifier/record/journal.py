@@ -41,6 +41,7 @@ from falsifier.record.records import (
     line_of,
     parse_line,
 )
+from falsifier.record.replay import played_back
 from falsifier.search.events import Asked, Confirmed, Evaluated, Event, Exchanged, RunEnded
 from falsifier.search.request import Keep
 
@@ -71,6 +72,7 @@ class Journal:
         self._file.truncate(self._reader.offset)  # drops a line that a crash left incomplete
         # A resumed run repeats the events that are recorded already; they are not written again.
         self._recorded = Counter(map(_key, self.records))
+        self._recorded["exchange",] = len(played_back(self.records)[0])  # the others are asked again
         self._kept_bytes = sum(p.stat().st_size for p in (directory / files.TRAJECTORIES).glob("*.npz"))
         self._synced = monotonic()
 
@@ -94,6 +96,8 @@ class Journal:
                 self._evaluated(event)
             case Confirmed():
                 self._add(ConfirmedRecord.of(event.confirmation, index=event.index, spent=event.spent))
+            case RunEnded() if event.status in ("interrupted", "failed") and self._is_repeating:
+                pass  # it has spent what is recorded, and that is more than it has repeated
             case RunEnded():
                 findings = {r.problem.name: list(r.findings) for r in event.results if r.findings}
                 self.write(
@@ -133,6 +137,10 @@ class Journal:
         """Append a record, unless the journal contains it already."""
         if not self._is_recorded(_key(record)):
             self.write(record)
+
+    @property
+    def _is_repeating(self) -> bool:
+        return any(left and kind != "ended" for (kind, *_), left in self._recorded.items())
 
     def _is_recorded(self, key: tuple[str | int, ...]) -> bool:
         found = self._recorded[key] > 0

@@ -87,7 +87,7 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
     """Return steps that replay a journal; with an empty journal, the live ones."""
     if not records:
         return live
-    exchanges, unrepeated = _played_back(records)
+    exchanges, unrepeated = played_back(records)
     evaluated = {r.index: r for r in records if isinstance(r, EvaluatedRecord)}
     return ReplayedSteps(
         executor=live.executor,
@@ -103,7 +103,7 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
     )
 
 
-def _played_back(records: Sequence[Record]) -> tuple[list[Exchange], Spent]:
+def played_back(records: Sequence[Record]) -> tuple[list[Exchange], Spent]:
     """The exchanges that a resumed run plays back, and what the others had cost when the run ended.
 
     A question to which no reply was valid, at which the run failed, is asked again: its recorded replies

@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from time import monotonic
 from typing import overload
@@ -278,8 +279,9 @@ def carry_out(
                 f"{directory} contains a journal without its manifest, so its run is unknown: "
                 "choose another directory, or delete it"
             )
+        check = partial(check_new, resume="" if request.problems else "resume() with problems=[...]")
         if directory is not None and not resume:
-            check_new(directory, "" if request.problems else "resume() with problems=[...]")
+            check(directory)
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         recorded = manifest.read(directory) if begun and directory else None
         told = told_problems(request, problems, recorded.contexts if recorded else {})
@@ -299,6 +301,7 @@ def carry_out(
                 manifest.check_unchanged(directory, recorded.fingerprints, described.fingerprints)
             journal = stack.enter_context(open_journal(directory, keep=request.keep, patience=patience))
             if recorded is None:
+                check(directory)  # another process may have begun a run there meanwhile
                 manifest.write(directory, described)
             elif recorded.request.budget != request.budget and not any(
                 isinstance(r, EndedRecord) and r.status == "falsified" for r in journal.records

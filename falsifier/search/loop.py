@@ -9,6 +9,7 @@ from pathlib import Path
 from time import perf_counter
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.posix import undisturbed
 from falsifier.core.words import counted
 from falsifier.engines.protocol import KNOWN, RANDOM_CHANGE, AsksLLM, Engine, FollowsRun
 from falsifier.errors import ChatError, SpecError, refusal
@@ -276,28 +277,29 @@ class _Loop:
         is faster. Those that are still under way when the search ends are not counted.
         """
         evaluation = wait()
-        # Also against the one whose engine proposed it, because a resumed run needs that verdict.
-        judges = standing if asked in standing else [asked, *standing]
-        judged = [(s, evaluation if s is asked else judge(s.problem, evaluation)) for s in judges]
-        improved = [state.note(seen) for state, seen in judged]
-        failed = all(seen.status != "ok" for _, seen in judged)
-        self.last_error = evaluation.reason if failed else self.last_error
-        self.spent = self.clock() + Spent(
-            simulations=1, simulation_seconds=evaluation.seconds, failures=int(failed)
-        )
-        self.emit(
-            events.Evaluated(
-                index=self.count,
-                problem=asked.problem,
-                evaluation=evaluation,
-                judged={state.problem.name: seen for state, seen in judged},
-                improved=any(improved),
-                best=asked.best,
-                spent=self.spent,
-                replayed=self.count < self.steps.replayed,
+        with undisturbed():  # it is recorded: its simulation may have taken hours
+            # Also against the one whose engine proposed it, because a resumed run needs that verdict.
+            judges = standing if asked in standing else [asked, *standing]
+            judged = [(s, evaluation if s is asked else judge(s.problem, evaluation)) for s in judges]
+            improved = [state.note(seen) for state, seen in judged]
+            failed = all(seen.status != "ok" for _, seen in judged)
+            self.last_error = evaluation.reason if failed else self.last_error
+            self.spent = self.clock() + Spent(
+                simulations=1, simulation_seconds=evaluation.seconds, failures=int(failed)
             )
-        )
-        self.count += 1
+            self.emit(
+                events.Evaluated(
+                    index=self.count,
+                    problem=asked.problem,
+                    evaluation=evaluation,
+                    judged={state.problem.name: seen for state, seen in judged},
+                    improved=any(improved),
+                    best=asked.best,
+                    spent=self.spent,
+                    replayed=self.count < self.steps.replayed,
+                )
+            )
+            self.count += 1
         if self.most < inf:
             space, signals = asked.problem.space, evaluation.candidate.signals
             if all(space.is_fixed(r, signals[r.name]) for r in space.inputs):  # known ones may have others
@@ -317,16 +319,17 @@ class _Loop:
     def consider(self, state: RequirementState, evaluation: Evaluation) -> None:
         """Check a violation of one requirement; a fragile or refuted one does not end the search for it."""
         confirmation = self.steps.confirm(state.problem, evaluation, self.count - 1)
-        spent = self.clock()
-        if confirmation.outcome == "confirmed":
-            state.counterexample, state.spent = confirmation, spent
-        else:
-            state.doubtful.append(confirmation)
-            if isinstance(state.engine, FollowsRun):
-                state.engine.doubt(confirmation)
-        is_last = all(state.counterexample is not None for state in self.states)
-        emit = self.emit_last if is_last else self.emit
-        emit(events.Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent))
+        with undisturbed():
+            spent = self.clock()
+            if confirmation.outcome == "confirmed":
+                state.counterexample, state.spent = confirmation, spent
+            else:
+                state.doubtful.append(confirmation)
+                if isinstance(state.engine, FollowsRun):
+                    state.engine.doubt(confirmation)
+            is_last = all(state.counterexample is not None for state in self.states)
+            emit = self.emit_last if is_last else self.emit
+            emit(events.Confirmed(index=self.count - 1, confirmation=confirmation, spent=spent))
 
     def exchanged(self, exchange: Exchange) -> None:
         """Count and announce an exchange with a language model."""

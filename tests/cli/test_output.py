@@ -67,6 +67,28 @@ def started(code: str) -> "subprocess.Popen[str]":
     )
 
 
+# As pydantic does while it makes a class: Ctrl-C often comes while a command is still being imported.
+REPLACED = """
+from unittest.mock import patch
+from falsifier import cli
+
+def replace(*_):
+    try:
+        raise KeyboardInterrupt
+    except KeyboardInterrupt as error:
+        raise TypeError(f"{type(error).__name__}: ") from None
+
+with patch("falsifier.cli.check_memory_limits", replace):
+    cli.main()
+"""
+
+
+def test_ctrl_c_that_a_library_replaced_by_an_error_of_its_own_is_no_defect() -> None:
+    process = started(REPLACED)
+    _, err = process.communicate(timeout=50)
+    assert (process.returncode, err) == (130, "interrupted\n")
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize(("code", "interrupts", "ends_with"), [(STUBBORN, 2, 130), (ENDED, 1, 1)])
 def test_ctrl_c_ends_without_traceback(code: str, interrupts: int, ends_with: int, number: int) -> None:

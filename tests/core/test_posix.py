@@ -1,6 +1,8 @@
 import fcntl
+import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -46,3 +48,24 @@ def test_a_program_ends_as_the_one_that_it_watches(tmp_path: Path) -> None:
         program.send(b"end\n", HANG)
         assert program.ends_within(HANG)
         assert program.end() == 5
+
+
+@pytest.fixture
+def stoppable() -> Iterator[None]:
+    """Ctrl-C raises KeyboardInterrupt, whoever runs the tests."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("stoppable")
+@pytest.mark.parametrize(("interrupts", "done"), [(1, ["one", "two"]), (2, ["one"])])
+def test_a_step_is_completed_before_the_first_interrupt(interrupts: int, done: list[str]) -> None:
+    steps = []
+    with pytest.raises(KeyboardInterrupt), posix.undisturbed():
+        steps.append("one")
+        for _ in range(interrupts):
+            signal.raise_signal(signal.SIGINT)
+        steps.append("two")
+    assert steps == done
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler

@@ -1,6 +1,8 @@
 """Workers: threads and processes of this machine."""
 
 import logging
+import signal
+import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor
@@ -64,6 +66,20 @@ def test_a_machine_without_shared_memory_is_told_what_is_wrong(monkeypatch: pyte
     reason = EMFILE
     with pytest.raises(OSError, match="Too many open files"):
         open_workers(1).__enter__()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads what a process blocks in /proc")
+def test_what_frees_shared_memory_outlives_the_end_of_a_session() -> None:
+    code = """if 1:
+        from multiprocessing.resource_tracker import _resource_tracker
+        from falsifier.evaluation.workers import _start_silent_tracker
+        _start_silent_tracker()
+        for pid in (_resource_tracker._pid, "self"):
+            print(*(line for line in open(f"/proc/{pid}/status") if line.startswith("SigBlk")), end="")
+    """
+    done = subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True, check=True)
+    blocked = [int(line.split()[1], 16) & 1 << (signal.SIGHUP - 1) for line in done.stdout.splitlines()]
+    assert list(map(bool, blocked)) == [True, False]
 
 
 def test_an_fmu_is_simulated_in_a_process_per_thread() -> None:

@@ -1,5 +1,8 @@
 """Asking again with what was wrong."""
 
+import signal
+from unittest.mock import Mock
+
 import pytest
 
 from falsifier.errors import ChatError, ContextExceededError
@@ -120,3 +123,28 @@ def test_a_script_may_be_a_function_and_says_when_it_ends() -> None:
     chat.complete(QUESTION)
     with pytest.raises(ChatError, match="contains only 1 line, but request 2 was made"):
         chat.complete(QUESTION)
+
+
+def test_a_reply_that_was_paid_for_is_recorded_though_ctrl_c_comes_while_it_is_read() -> None:
+    def read(text: str) -> int:
+        signal.raise_signal(signal.SIGINT)
+        return number(text)
+
+    exchanges: list[Exchange] = []
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            converse(ScriptedChat(["7"]), QUESTION, read, exchanges.append)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert [e.problem for e in exchanges] == [None]
+
+
+def test_a_reply_is_kept_for_later_runs_though_the_run_cannot_record_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    kept = Mock()
+    monkeypatch.setattr(ScriptedChat, "accepted", kept)
+    with pytest.raises(OSError, match="full"):
+        converse(ScriptedChat(["7"]), QUESTION, number, Mock(side_effect=OSError("full")))
+    assert kept.call_count == 1

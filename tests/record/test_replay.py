@@ -1,3 +1,4 @@
+import json
 import shutil
 from collections.abc import Iterator
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -14,6 +15,7 @@ from falsifier.core.model import Model
 from falsifier.engines import make_engine
 from falsifier.errors import JournalError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
+from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.problem import Problem
 from falsifier.record.files import recorded_trajectory
 from falsifier.record.journal import read_journal
@@ -26,6 +28,7 @@ from falsifier.testing import lag_problem
 from tests.patience import HANG
 from tests.problems import decades
 from tests.record.support import run
+from tests.searches import stop_after
 
 PROBLEM = lag_problem("G[0,10] (x <= 2)")
 
@@ -50,12 +53,37 @@ def test_resume_from_any_line_gives_the_uninterrupted_run(
     assert (kinds.count("evaluated"), kinds.count("asked")) == (20, 20)
 
 
+def suggested(value: float) -> str:
+    return json.dumps({"rationale": "", "signals": [{"name": "u", "values": [value] * 4}]})
+
+
+def test_a_reply_to_the_question_at_which_a_run_had_failed_is_recorded(tmp_path: Path) -> None:
+    failed = falsify(PROBLEM, llm=ScriptedChat([suggested(0.1), *["no"] * 9]), budget=4, directory=tmp_path)
+    assert failed.status == "failed"
+    resume(tmp_path, problems=[PROBLEM], chat=ScriptedChat([suggested(0.2)]))
+    (longer,) = resume(tmp_path, problems=[PROBLEM], chat=ScriptedChat([suggested(0.3)]), budget=5)
+    assert [e.candidate.signals["u"].values[0] for e in longer.evaluations[3:]] == [0.2, 0.3]
+    assert longer.spent.calls == 12
+
+
+def test_a_run_that_is_stopped_while_it_is_repeated_has_spent_what_it_had(tmp_path: Path) -> None:
+    replies = [suggested(0.1 * i) for i in range(5)]
+    falsify(PROBLEM, llm=ScriptedChat(replies[:4]), budget=4, directory=tmp_path)
+    journal = (tmp_path / "journal.jsonl").read_bytes()
+    (stopped,) = resume(tmp_path, problems=[PROBLEM], chat=ScriptedChat([]), listeners=stop_after(2))
+    assert stopped.status == "interrupted" and (tmp_path / "journal.jsonl").read_bytes() == journal
+    (longer,) = resume(tmp_path, problems=[PROBLEM], chat=ScriptedChat(replies[4:]), budget=5)
+    assert longer.spent.calls == 5
+
+
 def test_resume_with_another_seed_is_refused(tmp_path: Path) -> None:
     run(PROBLEM, tmp_path, budget=3)
+    journal = (tmp_path / "journal.jsonl").read_bytes()
     with pytest.raises(
         JournalError, match=r"candidate 0 of the engine 'uniform' differs .* does not propose"
     ):
         resume(tmp_path, problems=[PROBLEM], engine=make_engine("uniform", PROBLEM, seed=2))
+    assert (tmp_path / "journal.jsonl").read_bytes() == journal, "the run ended as it ended"
 
 
 def test_time_stands_still_while_a_run_is_repeated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

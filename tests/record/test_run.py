@@ -237,6 +237,23 @@ def test_a_loaded_problem_that_was_changed_counts_as_made_in_python(tmp_path: Pa
 CHASE = "G[0,100] (car5.mode <= 2)"
 
 
+def test_a_run_that_another_process_made_meanwhile_in_the_same_folder_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two jobs of a script that were given one folder: the second had found it empty."""
+
+    def begun(*arguments: Any, **options: Any) -> Any:
+        monkeypatch.undo()
+        falsify(impossible(), "uniform", budget=2, directory=tmp_path)
+        return make_engines(*arguments, **options)
+
+    monkeypatch.setattr("falsifier.record.run.make_engines", begun)
+    with pytest.raises(JournalError, match="already contains a run"):
+        falsify(impossible(), "uniform", budget=3, directory=tmp_path)
+    (result,) = resume(tmp_path, problems=[impossible()])
+    assert result.spent.simulations == 2
+
+
 def test_engines_see_internal_variables_and_a_resumed_run_those_that_it_had(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

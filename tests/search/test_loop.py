@@ -1,8 +1,11 @@
+import signal
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from importlib import import_module
 from math import inf
 from pathlib import Path
 from time import sleep
+from typing import Any
 
 import pytest
 
@@ -103,6 +106,30 @@ def test_the_time_of_a_question_that_is_interrupted_is_the_engines() -> None:
 
     result = falsify(lag_problem(), Asked(lag_problem()))
     assert result.status == "interrupted" and result.spent.engine_seconds >= 0.05
+
+
+@pytest.mark.parametrize(
+    ("within", "kind"), [("search.loop.judge", "evaluated"), ("search.events.Confirmed", "confirmed")]
+)
+def test_what_was_simulated_is_recorded_before_ctrl_c_ends_the_run(
+    within: str, kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module, _, name = f"falsifier.{within}".rpartition(".")
+    original = getattr(import_module(module), name)
+
+    def interrupted(*arguments: Any, **options: Any) -> object:
+        signal.raise_signal(signal.SIGINT)
+        return original(*arguments, **options)
+
+    monkeypatch.setattr(f"falsifier.{within}", interrupted)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        problems = [lag_problem(name="A"), lag_problem(name="B")]
+        results = falsify(problems, "corners", budget=20, directory=tmp_path)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert "interrupted" in {result.status for result in results}
+    assert [r.kind for r in read_journal(tmp_path)][-2:] == [kind, "ended"]
 
 
 def test_batches_are_told_in_the_order_of_asking() -> None:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from math import isclose
 from pathlib import Path
 from typing import Literal
 
@@ -197,7 +198,9 @@ def _shrunk(run: Run) -> Shown | None:
         return None  # the original is shown instead
     formula = parse(run.manifest.requirement.formula)
     verdict = Monitor(formula, trajectory.step, len(trajectory)).evaluate(trajectory)
-    if stored.origin != run.manifest.origin or not verdict.violated:
+    # One that was interrupted may have left the samples of an earlier one.
+    is_its = isclose(verdict.robustness, stored.robustness, rel_tol=1e-9)
+    if stored.origin != run.manifest.origin or not verdict.violated or not is_its:
         return None
     return replace(_drawn(run, candidate, trajectory, verdict, stored.reason), is_shrunk=True)
 

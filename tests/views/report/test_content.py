@@ -118,7 +118,8 @@ def test_causes_of_failures_and_what_was_not_searched_are_in_every_report(tmp_pa
 
 
 def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_any(tmp_path: Path) -> None:
-    assert falsify(hard(), "uniform", budget=20, directory=tmp_path).falsified
+    original = falsify(hard(), "uniform", budget=20, directory=tmp_path).counterexample
+    assert original is not None and original.evaluation.trajectory is not None
     before = gather(tmp_path)[0].sections[0].shown[0]
     assert not before.is_shrunk and not before.explanation
     assert f"falsifier explain {tmp_path} --shrink" in markdown_report(tmp_path)
@@ -138,6 +139,8 @@ def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_an
     assert all(f"falsifier replay {tmp_path / 'shrunk.json'}" in report for report in (page, text))
     found = load_counterexample(tmp_path)  # as if no simpler one had been found
     save(found, tmp_path / "shrunk.json")
+    assert not gather(tmp_path)[0].sections[0].shown[0].is_shrunk, "the samples are those of another one"
+    original.evaluation.trajectory.save(tmp_path / "shrunk.npz")
     assert "The counterexample, of which no simpler one was found nearby:" in markdown_report(tmp_path)
     os.utime(tmp_path / "explanation.txt", (0, 0))
     assert not gather(tmp_path)[0].sections[0].shown[0].explanation, "the run went on since"
