@@ -176,12 +176,11 @@ def _carried_out(arguments: list[str]) -> int:
     except MemoryError:
         warn("falsifier: not enough memory; free some, or raise the limit (ulimit)")
         return output.FAILED
-    except Exception:
-        trace = traceback.format_exc()
-        if "KeyboardInterrupt" in trace:  # which a library replaced, as pydantic does while it makes a class
+    except Exception as error:
+        if "KeyboardInterrupt" in str(error):  # pydantic puts its name in place of it while it makes a class
             warn("interrupted")
             return output.INTERRUPTED
-        warn(f"{trace}falsifier: this is a defect of falsifier itself; please report it")
+        warn(f"{traceback.format_exc()}falsifier: this is a defect of falsifier itself; please report it")
         return output.FAILED
 
 
