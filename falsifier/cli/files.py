@@ -4,6 +4,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from datetime import datetime
 from itertools import chain, count
+from os.path import realpath
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +110,7 @@ def saved(file: Path, write: Callable[[Path], object]) -> list[Path]:
 def write_named(file: Path, text: str) -> None:
     """Write a file or stream that users named, and say so; OSError naming it, and nothing remains of it."""
     if file.is_file() or not file.exists():
-        write_whole(file.resolve(), text)  # a link is followed, not replaced
+        write_whole(Path(realpath(file)), text)  # a link is followed, not replaced
     else:
         file.write_text(text, encoding="utf-8")
     warn(f"{file} written")

@@ -20,12 +20,12 @@ from falsifier.core.literals import shell_word
 from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.words import in_unit
-from falsifier.errors import MachineError, ModelError, SpecError
+from falsifier.errors import MachineError, ModelError, SpecError, in_section
 from falsifier.evaluation.confirm import step_convergence, sufficient_step
 from falsifier.fmu import FmuModel, System, is_package, read_info, read_package, rights_text
 from falsifier.problem.grid import choose_grid
 from falsifier.problem.loading import find_spec
-from falsifier.problem.models import make_system, rights_of
+from falsifier.problem.models import existing_fmu, make_system, rights_of
 from falsifier.problem.sections import ModelSection
 from falsifier.problem.source import Target
 from falsifier.problem.spec import read_spec
@@ -199,7 +199,8 @@ def _named(given: Path) -> Path | System:
     if path is None:
         return _existing_fmu(given)
     spec = read_spec(path)
-    return make_system(spec, path) if spec.is_system else _existing_fmu(path.parent / (spec.model.fmu or ""))
+    with in_section(str(path)):
+        return make_system(spec, path) if spec.is_system else existing_fmu(path, spec.model.fmu or "")
 
 
 def _spec_of(given: Path) -> Path | None:

@@ -1,6 +1,7 @@
 """``falsifier report`` and ``falsifier coverage``: what a run or campaign has recorded."""
 
 from collections.abc import Iterable
+from os.path import realpath
 from pathlib import Path
 
 import click
@@ -59,7 +60,7 @@ def report(
     page, kind = (b"# Falsification report: ", ".md") if markdown else (b"<!DOCTYPE html>", ".html")
     outputs = ((arch_comp, _ARCH_COMP, ".csv"), (csv_file, _EVALUATIONS, ".csv"), (path, page, kind))
     named = [(file, begins, ending) for file, begins, ending in outputs if file is not None]
-    if len({file.resolve() for file, _, _ in named}) < len(named):
+    if len({realpath(file) for file, _, _ in named}) < len(named):
         raise click.UsageError("--out, --csv and --arch-comp: expected a file for each, got one for two")
     for file, begins, ending in named:
         if file.parent != first:  # whether that is a run is seen when it is read

@@ -141,9 +141,12 @@ class Variable:
     def expected(self, value: float) -> str:
         """Say what is expected instead of a value that the type does not have; empty if it has it."""
         numbers = self.literals.values() or ((0, 1) if self.kind == "boolean" else (round(value),))
-        if self.kind == "real" or (value in numbers and abs(value) <= _EXACT):
+        least, most = self.type_limits or (-_EXACT, _EXACT)
+        least, most = max(least, -_EXACT), min(most, _EXACT)
+        if self.kind == "real" or (value in numbers and least <= value <= most):
             return ""
-        size = "" if abs(value) <= _EXACT else f" of at most {_EXACT} (larger doubles are not exact)"
+        size = "" if least <= value <= most else f" from {least} to {most}"
+        size += " (larger doubles are not exact)" if size and most == _EXACT else ""
         whole = "0 or 1" if self.kind == "boolean" else f"an integer{size}"
         return f"expected {f'one of {self.items_text}' if self.literals else whole} for {self.name!r}"
 

@@ -87,6 +87,8 @@ PROVIDERS: Mapping[str, Provider] = MappingProxyType(
 NO_KEY = "none"
 # Options of litellm that take the place of the address or of the provider in the name.
 _OF_SERVERS = frozenset({"base_url", "api_base", "custom_llm_provider"})
+# What each request states by itself.
+_OF_REQUESTS = frozenset({"model", "messages", "drop_params"})
 _ADDRESS_FORM = "http://HOST:PORT/v1 or https://..."
 
 
@@ -130,7 +132,11 @@ def _is_address(text: str) -> bool:
 
 
 def check_option_values(options: Mapping[str, Any]) -> None:
-    """Refuse other servers, numbers no request can contain, impossible limits of tokens; ChatSetupError."""
+    """Refuse other servers and prompts, numbers no request can contain, impossible limits of tokens.
+
+    Raises:
+        ChatSetupError: naming the option.
+    """
     for name, value in options.items():
         option = written(f"--llm-option {name}", name)
         if name in _OF_SERVERS:  # prompts and the key would go to another one than is told
@@ -138,6 +144,8 @@ def check_option_values(options: Mapping[str, Any]) -> None:
                 f"{option}: state the address of a server as {setting('api_base')}, and the provider as the "
                 "first part of the name"
             )
+        if name in _OF_REQUESTS:
+            raise ChatSetupError(f"{option}: every request states it by itself; leave it out")
         if isinstance(value, float) and not isfinite(value):
             raise ChatSetupError(f"{option}: expected a finite number, got {value}")
         if name in ("max_tokens", "max_completion_tokens") and (type(value) is not int or value < 1):

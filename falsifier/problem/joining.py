@@ -219,6 +219,7 @@ def _experiment(
     output_interval, step_size, grid = stated("output_interval"), stated("step_size"), None
     changed = [k for k in ("output_interval", "step_size", "stop_time") if getattr(changes, k) is not None]
     with naming(setting(changed[0]) if changed else None):
+        check_steps(stop_time, stop_time, key="model.stop_time")
         if output_interval is None:
             times = formula_times(formulas_of(stop_time))
             steps = {"fmu_step": info.step_size, "internal_step": info.internal_step}

@@ -34,7 +34,7 @@ def make_model(spec: Spec, layers: Sequence[ModelChanges], path: Path) -> Model:
                 key="model.interface",
             )
         return replace(make_system(spec, path, logging=logging), allow=allow, deny=deny)
-    file = _existing(path, spec.model.fmu or "", "model.fmu")
+    file = existing_fmu(path, spec.model.fmu or "")
     return fmu.FmuModel(
         file, interface=_interface(interface, fmu.read_info(file)), logging=logging, allow=allow, deny=deny
     )
@@ -63,11 +63,11 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> fmu.System:
     with in_section(str(path)):
         coupling = fmu.Coupling(**spec.coupling.model_dump())
         if spec.model.fmu is not None:
-            package = fmu.read_package(_existing(path, spec.model.fmu, "model.fmu"), coupling=coupling)
+            package = fmu.read_package(existing_fmu(path, spec.model.fmu), coupling=coupling)
             return replace(package, logging=logging)
         components = {
             name: fmu.Component(
-                _existing(path, part.fmu, f"components.{name}.fmu"), part.step, part.interface
+                existing_fmu(path, part.fmu, f"components.{name}.fmu"), part.step, part.interface
             )
             for name, part in spec.components.items()
         }
@@ -78,7 +78,8 @@ def make_system(spec: Spec, path: Path, *, logging: bool = False) -> fmu.System:
         return fmu.System(components, connections, coupling=coupling, name=path.stem, logging=logging)
 
 
-def _existing(path: Path, named: str, key: str) -> Path:
+def existing_fmu(path: Path, named: str, key: str = "model.fmu") -> Path:
+    """Return the FMU that the spec at a path names at a key; SpecError if there is none."""
     if fmu.is_package(named) and key != "model.fmu":
         raise SpecError(
             "an SSP package cannot be a component; name it as fmu in [model], or its FMUs here", key=key

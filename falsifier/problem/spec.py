@@ -60,7 +60,9 @@ _TABLES = {
 def _kind_of_requirement(section: object) -> str | None:
     """Return which section a requirement is; None if there is no such template."""
     name = section.get("template") if isinstance(section, Mapping) else getattr(section, "template", None)
-    return "<formula>" if name is None else f"<{name}>" if name in TEMPLATES else None
+    if name is None:
+        return "<formula>"
+    return f"<{name}>" if isinstance(name, str) and name in TEMPLATES else None
 
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from falsifier.core.files import check_seal, checksum, seal, write_whole
 from falsifier.core.literals import one_line, shell_word
 from falsifier.core.posix_files import lock_file
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import JournalError, MonitorError, first_fault, written
+from falsifier.errors import JournalError, MonitorError, first_fault, in_section, written
 
 _LOG = logging.getLogger(__name__)
 
@@ -47,7 +47,8 @@ def read_sealed(path: Path, kind: type[Content], *, what: str) -> Content:
     try:
         content = path.read_bytes()
         check_seal(content)
-        return kind.model_validate_json(content)
+        with in_section(str(path)):  # of values that are checked when they are made
+            return kind.model_validate_json(content)
     except (FileNotFoundError, NotADirectoryError):
         if not path.parent.exists():
             raise JournalError(f"{path.parent}: no such directory; expected that of a {what}") from None

@@ -254,6 +254,8 @@ class JournalReader:
         self.path = directory / JOURNAL
         self.offset = 0
         self.line = 0
+        # Numbers of candidates and of evaluations so far.
+        self._asked = self._evaluated = 0
 
     @cached_property
     def run(self) -> str | None:
@@ -279,6 +281,7 @@ class JournalReader:
                 try:
                     check_seal(line)
                     record = parse_line(line, number, self.run)
+                    self._count(record)
                 except ValueError as error:
                     raise JournalError(
                         f"{self.path}: line {number} is damaged: {error}; to drop what is damaged: "
@@ -286,6 +289,18 @@ class JournalReader:
                     ) from error
                 self.line, self.offset = number, self.offset + len(line)
                 yield record
+
+    def _count(self, record: Record) -> None:
+        """Count what a record is about; ValueError if what it follows from was not recorded before it."""
+        match record:
+            case AskedRecord() if record.first == self._asked:
+                self._asked += len(record.candidates)
+            case EvaluatedRecord() if record.index == self._evaluated < self._asked:
+                self._evaluated += 1
+            case ConfirmedRecord() if not 0 <= record.index < self._evaluated:
+                raise ValueError(f"simulation {record.index}, which it confirms, is not recorded before it")
+            case AskedRecord() | EvaluatedRecord():
+                raise ValueError("the candidates or simulations before those that it is about are missing")
 
 
 def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:

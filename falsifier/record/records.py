@@ -7,6 +7,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import seal
 from falsifier.core.strict import Strict
+from falsifier.errors import first_fault
 from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Evaluation, Status
 from falsifier.llm.messages import Exchange
@@ -135,7 +136,7 @@ def parse_line(line: bytes, number: int, run: str | None = None) -> Record:
     try:
         record = RECORDS.validate_json(line)
     except ValidationError as error:
-        raise ValueError(error.errors()[0]["msg"]) from None
+        raise ValueError(": ".join(filter(None, first_fault(error)))) from None
     if run not in (None, record.run):
         raise ValueError("it was written by another run than the one that manifest.json describes")
     if record.line != number:

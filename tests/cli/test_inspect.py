@@ -45,6 +45,9 @@ def test_info_takes_a_bundled_requirement_or_a_spec_for_its_fmu(tmp_path: Path) 
     spec = falsifier("info", str(bundled("specs") / "AT.toml"), cwd=tmp_path).out
     assert spec == falsifier("info", str(bundled("fmus") / "AT.fmu"), cwd=tmp_path).out
     assert spec == falsifier("info", f"{bundled('specs') / 'AT.toml'}:AT1", cwd=tmp_path).out
+    (tmp_path / "s.toml").write_text("[model]\nfmu = 'AT'\n[requirements.R]\nformula = 'y <= 1'\n")
+    missing = falsifier("info", "s.toml", cwd=tmp_path, code=2).err
+    assert "s.toml: model.fmu: " in missing and "no such file" in missing
 
 
 @pytest.mark.parametrize("given", [["."], ["/"], [".", "car.fmu"]])

@@ -36,6 +36,8 @@ def test_every_evaluation_is_written_as_a_table(command: Any, tmp_path: Path) ->
     bench(command, "--out", "c", "--quiet")
     for _ in range(2):  # what it wrote is replaced
         command("report", "c", "--csv", "e.csv", code=0)
+    (tmp_path / "loop").symlink_to("loop")
+    command("report", "c", "--csv", "loop", code=0)  # a link to itself is followed nowhere, and replaced
     with (tmp_path / "e.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert {row["status"] for row in rows} == {"ok"}

@@ -42,6 +42,11 @@ def clear(error: pytest.ExceptionInfo[FalsifierError]) -> str:
     [
         ("stop_time = 1\noutput_interval = 1e-12", "control_points = 3", "model.output_interval"),
         ("stop_time = 1\nstep_size = 1e-12", "control_points = 3", "model.step_size"),
+        (
+            "stop_time = 1e-320",
+            "control_points = 3",
+            "model.stop_time: .* so short .* smallest value is 1e-10",
+        ),
         ("stop_time = 1", "control_points = 1000000000", "inputs.throttle.control_points"),
         ("stop_time = 1", "control_points = 3\nhold = 1e-9", "inputs.throttle.hold"),
         (

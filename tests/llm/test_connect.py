@@ -91,6 +91,9 @@ def test_options_of_servers_that_are_not_known_are_sent_as_they_are() -> None:
     connect("ollama_chat/x", options={"foo": 1})
     with pytest.raises(ChatSetupError, match="timeout: pass it as an argument"):
         connect("ollama_chat/x", options={"timeout": 5})
+    for name in ("model", "messages", "drop_params"):
+        with pytest.raises(ChatSetupError, match=f"^{name}: every request states it by itself; leave it out"):
+            connect("ollama_chat/x", options={name: "x"})
 
 
 def test_a_server_is_where_it_is_said_to_be(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -53,6 +53,7 @@ def changed(path: str, value: object) -> dict[str, Any]:
         ("requirements", {}, r"requirements: "),
         ("requirements.R", {"tempalte": "x"}, r"requirements\.R\.tempalte: .* did you mean 'template'"),
         ("connections", {"a.b": {"source": "c.d"}}, r"connections\.a\.b\.source: unknown key; known: from,"),
+        ("requirements.R", {"template": ["rise"]}, r"requirements\.R\.template: no such template; did you"),
         ("requirements.R.template", "settles", r"requirements\.R\.formula: .* has a template, too; give one"),
         ("requirements.R", "G (x <= 1)", r"requirements\.R: expected a table: \[requirements\.R\] with"),
         ("parameters.x[1]", [0, 1], r"parameters\.x\[1\]: expected a table: \[parameters\.\"x\[1\]\"\] with"),

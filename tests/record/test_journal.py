@@ -1,6 +1,7 @@
 """Reading and writing the record of a run."""
 
 import errno
+import json
 import os
 from contextlib import ExitStack
 from pathlib import Path
@@ -9,28 +10,31 @@ from unittest.mock import Mock
 
 import pytest
 
+from falsifier.core.files import seal
 from falsifier.errors import JournalError, MachineError
 from falsifier.record import journal
 from falsifier.record.files import is_locked, recorded_trajectory, set_aside
-from falsifier.record.records import line_of
+from falsifier.record.records import Record, line_of
 from falsifier.record.run import falsify
+from falsifier.search.budget import Spent
 from falsifier.search.result import Result
 from falsifier.views.report.page import html_report
 from tests.hostile.test_damage import Standing
 from tests.patience import HANG
 from tests.problems import impossible
-from tests.record.test_summary import evaluated
+from tests.record.test_summary import asked, confirmed, evaluated
 
 
 def test_a_growing_journal_is_read_on_from_where_it_ended(tmp_path: Path) -> None:
     reader = journal.JournalReader(tmp_path)
     assert list(reader.new()) == []
     path = tmp_path / "journal.jsonl"
-    lines = [line_of(evaluated(i, float(i)), i + 1) for i in range(3)]
-    path.write_bytes(lines[0] + lines[1][:20])
-    assert [r.index for r in reader.new()] == [0]  # type: ignore[union-attr]
+    found: list[Record] = [asked(0, 3), *(evaluated(i, float(i)) for i in range(3))]
+    lines = [line_of(record, number) for number, record in enumerate(found, 1)]
+    path.write_bytes(lines[0] + lines[1] + lines[2][:20])
+    assert [r.line for r in reader.new()] == [1, 2]
     path.write_bytes(b"".join(lines))
-    assert [r.index for r in reader.new()] == [1, 2]  # type: ignore[union-attr]
+    assert [r.line for r in reader.new()] == [3, 4]
     path.write_bytes(lines[0])
     assert reader.shrank
 
@@ -38,13 +42,39 @@ def test_a_growing_journal_is_read_on_from_where_it_ended(tmp_path: Path) -> Non
 def test_a_journal_is_read_on_from_the_line_at_which_reading_was_interrupted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "journal.jsonl").write_bytes(line_of(evaluated(0, 0.0), 1))
+    (tmp_path / "journal.jsonl").write_bytes(line_of(asked(0, 1), 1))
     reader = journal.JournalReader(tmp_path)
     with monkeypatch.context() as stopped:
         stopped.setattr(journal, "parse_line", Mock(side_effect=KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             list(reader.new())
-    assert [r.index for r in reader.new()] == [0]  # type: ignore[union-attr]
+    assert [r.line for r in reader.new()] == [1]
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        ([evaluated(0, 0.0)], "line 1 .*: the candidates or simulations before .* are missing"),
+        ([asked(0, 1), evaluated(0, 0.0), evaluated(0, 0.0)], "line 3 .* are missing"),
+        ([asked(0, 2), evaluated(1, 0.0)], "line 2 .* are missing"),
+        ([asked(1, 1)], "line 1 .* are missing"),
+        ([asked(0, 1), confirmed(0, "confirmed", "", Spent())], "line 2 .*: simulation 0, which it confirms"),
+    ],
+)
+def test_a_journal_whose_records_do_not_follow_each_other_is_damaged(
+    found: list[Record], said: str, tmp_path: Path
+) -> None:
+    lines = [line_of(record, number) for number, record in enumerate(found, 1)]
+    (tmp_path / "journal.jsonl").write_bytes(b"".join(lines))
+    with pytest.raises(JournalError, match=f"journal.jsonl: {said}"):
+        journal.read_journal(tmp_path)
+
+
+def test_what_is_wrong_with_a_value_of_a_record_is_said_with_its_key(tmp_path: Path) -> None:
+    content = asked(0, 1).model_dump(exclude={"sum"}) | {"line": 1, "seconds": "x"}
+    (tmp_path / "journal.jsonl").write_text(seal(json.dumps(content)))
+    with pytest.raises(JournalError, match=r"line 1 is damaged: asked\.seconds: expected a number, got 'x'"):
+        journal.read_journal(tmp_path)
 
 
 def test_one_writer_per_directory(tmp_path: Path) -> None:

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, SpecError
 from falsifier.problem.loading import load_problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
@@ -51,4 +51,11 @@ def test_one_requirement_of_several_is_a_manifest_of_its_own() -> None:
 def test_a_key_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     write_manifest(tmp_path, DESCRIBED.model_dump(mode="json") | {"stop_time": "late"})
     with pytest.raises(JournalError, match="stop_time"):
+        manifest.read(tmp_path)
+    content = DESCRIBED.model_dump(mode="json")
+    content["request"]["budget"]["simulations"] = -4
+    write_manifest(tmp_path, content)
+    with pytest.raises(
+        SpecError, match=rf"{manifest.MANIFEST}: budget: simulations: expected a whole number, at least 1"
+    ):
         manifest.read(tmp_path)

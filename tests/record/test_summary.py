@@ -21,6 +21,13 @@ def evaluated(index: int, robustness: float | None) -> records.EvaluatedRecord:
     )
 
 
+def asked(first: int, count: int) -> records.AskedRecord:
+    candidates = [{"signals": {}, "parameters": {"p": float(i)}} for i in range(count)]
+    return records.AskedRecord(
+        first=first, n=count, candidates=candidates, seconds=0.1, requirement="R", elapsed=0.1
+    )
+
+
 def confirmed(index: int, outcome: Outcome, reason: str, spent: Spent) -> records.ConfirmedRecord:
     return records.ConfirmedRecord(
         index=index,
@@ -36,7 +43,7 @@ def confirmed(index: int, outcome: Outcome, reason: str, spent: Spent) -> record
 def test_a_growing_journal_is_counted_line_by_line() -> None:
     summary = Summary()
     assert status(summary) == "waiting"
-    summary.add(records.AskedRecord(first=0, n=1, candidates=[], seconds=0.1, requirement="R", elapsed=0.1))
+    summary.add(asked(0, 1))
     assert status(summary) == "running"
     for i, robustness in enumerate([2.0, None, 1.0, 1.0, -3.0]):
         summary.add(evaluated(i, robustness))

@@ -7,8 +7,9 @@ from math import pi
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
-from falsifier.errors import ModelError
+from falsifier.errors import ModelFileError
 from falsifier.fmu.description.archive import read_entry
+from falsifier.fmu.description.variables import about, real, whole
 from falsifier.fmu.description.xml import read_xml
 
 _BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
@@ -36,14 +37,12 @@ def read_units(root: Element, *, tag: str = "UnitDefinitions/Unit") -> dict[str,
     for element in root.findall(tag):
         base = element.find("{*}BaseUnit")
         if base is not None:
-            try:
+            with about(element):
                 found[element.attrib["name"]] = Unit(
-                    tuple(int(base.get(name, "0")) for name in _BASE),
-                    float(base.get("factor", "1")),
-                    float(base.get("offset", "0")),
+                    tuple(whole(base.attrib, name, "0") for name in _BASE),
+                    real(base.attrib, "factor", "1"),
+                    real(base.attrib, "offset", "0"),
                 )
-            except (LookupError, ValueError) as error:
-                raise ValueError(f"unit {element.get('name')!r}: {type(error).__name__}: {error}") from None
     return found
 
 
@@ -150,13 +149,13 @@ def read_structure(path: Path, sha256: str) -> Structure:
     Raises:
         ModelError: if its description cannot be read or does not follow the standard.
     """
-    root = read_xml(read_entry(path, "modelDescription.xml"), f"{path}: modelDescription.xml", ModelError)
+    root = read_xml(read_entry(path, "modelDescription.xml"), f"{path}: modelDescription.xml", ModelFileError)
     try:
         return Structure(read_units(root), *_dependencies(root))
     except (LookupError, ValueError) as error:
-        raise ModelError(
-            f"{path}: units or dependencies in modelDescription.xml do not follow the standard "
-            f"({type(error).__name__}: {error})"
+        said = f"there is no {error.args[0]!r}" if isinstance(error, KeyError) else error
+        raise ModelFileError(
+            f"{path}: units or dependencies in modelDescription.xml do not follow the standard ({said})"
         ) from error
 
 

@@ -102,7 +102,8 @@ def about(element: Element) -> Iterator[None]:
         yield
     except (LookupError, ValueError) as error:
         said = f"{error.args[0]} is missing" if isinstance(error, KeyError) else error
-        raise ValueError(f"{element.tag} {element.get('name', '')!r}: {said}") from None
+        tag = element.tag.rpartition("}")[2]
+        raise ValueError(f"{tag} {element.get('name', '')!r}: {said}") from None
 
 
 def whole(attributes: Mapping[str, str], name: str, default: str | None = None) -> int:
@@ -139,7 +140,7 @@ def _with_aliases_marked(variables: Sequence[Variable], slots: Mapping[str, Slot
 def input_clocks(root: Element) -> dict[int, str]:
     """Return the clocks that the importing tool would have to tick, by value reference (FMI 3)."""
     return {
-        int(clock.attrib["valueReference"]): clock.attrib["name"]
+        whole(clock.attrib, "valueReference"): clock.attrib["name"]
         for clock in root.findall("ModelVariables/Clock")
         if clock.get("causality") == "input"
     }
@@ -168,7 +169,7 @@ def _states_2(root: Element, elements: list[Element]) -> set[int]:
     """Return the positions, counted from 1, of the continuous states; FMI 1 does not list them."""
     states = set()
     for unknown in root.findall("ModelStructure/Derivatives/Unknown"):
-        if (index := whole(unknown.attrib, "index")) > len(elements):
+        if not 1 <= (index := whole(unknown.attrib, "index")) <= len(elements):
             raise ValueError(f"ModelStructure: index = {index}: there are {len(elements)} variables")
         derivative = elements[index - 1].find("Real")
         if derivative is not None and derivative.get("derivative"):
@@ -201,7 +202,7 @@ def _variables_3(root: Element, arrays: dict[int, tuple[float, ...]]) -> Iterato
             starts = _starts_3(kind, element)
             default = "continuous" if kind == "real" else "discrete"
             role = _role(element, 3, default, has_start=bool(starts))
-            clocks = set(map(int, element.get("clocks", "").split()))
+            clocks = {whole({"clocks": c}, "clocks") for c in element.get("clocks", "").split()}
             if clocks:
                 role = (*role[:2], "it belongs to a clock; only the FMU itself may change it")
             shape = tuple(_extent(d, elements) for d in element.findall("Dimension"))
@@ -263,7 +264,7 @@ def _variable(
         settable=not role[2],
         refusal=role[2],
         is_state=is_state,
-        literals={item.attrib["name"]: int(item.get("value", k)) for k, item in items},
+        literals={item.attrib["name"]: whole(item.attrib, "value", str(k)) for k, item in items},
         description=element.get("description", ""),
         type=type_[1],
         is_relative=is_true(attributes.get("relativeQuantity")),
@@ -292,8 +293,8 @@ def _role(element: Element, major: int, default_variability: str = "continuous",
 
 def _extent(dimension: Element, elements: Mapping[int, Element]) -> int:
     if "start" in dimension.attrib:
-        return int(dimension.attrib["start"])
-    return int(elements[int(dimension.attrib["valueReference"])].attrib["start"])
+        return whole(dimension.attrib, "start")
+    return whole(elements[whole(dimension.attrib, "valueReference")].attrib, "start")
 
 
 def _starts_3(kind: Kind, element: Element) -> tuple[float | str | None, ...]:
@@ -306,20 +307,22 @@ def _start(kind: Kind, attributes: Mapping[str, str]) -> float | str | None:
     text = attributes.get("start")
     if text is None or kind == "string":
         return text
-    return float(is_true(text)) if kind == "boolean" else _real(attributes, "start")
+    return float(is_true(text)) if kind == "boolean" else real(attributes, "start")
 
 
 def finite(attributes: Mapping[str, str], name: str) -> float | None:
     """Return the number of an attribute; None without one, and for NaN and infinity, which limit nothing."""
-    found = _real(attributes, name) if name in attributes else inf
+    found = real(attributes, name) if name in attributes else inf
     return found if isfinite(found) else None
 
 
-def _real(attributes: Mapping[str, str], name: str) -> float:
+def real(attributes: Mapping[str, str], name: str, default: str = "") -> float:
+    """Return an attribute as a number; ValueError naming it if it is none."""
+    text = attributes.get(name, default)
     try:
-        return float(attributes[name])
+        return float(text)
     except ValueError:
-        raise ValueError(f"{name} = {attributes[name][:40]!r}: expected a number") from None
+        raise ValueError(f"{name} = {text[:40]!r}: expected a number") from None
 
 
 def _limit(attributes: Mapping[str, str], name: str) -> float | None:

@@ -62,6 +62,10 @@ def test_enumerations_tell_their_literals(name: str) -> None:
 
 
 DERIVATIVE = '<Derivatives><Unknown index="9"/></Derivatives>'
+SIZED = """<fmiModelDescription fmiVersion="3.0" modelName="M" instantiationToken="g">
+<CoSimulation modelIdentifier="M"/><ModelVariables>
+<Float64 name="x" valueReference="1"><Dimension {}/></Float64></ModelVariables>
+<ModelStructure/></fmiModelDescription>"""
 ROLES = """
 <fmiModelDescription fmiVersion="2.0" modelName="M" guid="g"><CoSimulation modelIdentifier="M"/>
 <ModelVariables>
@@ -145,6 +149,14 @@ def test_start_values_and_items_that_cannot_all_be_used_are_noted() -> None:
             ROLES.replace("<ModelStructure/>", f"<ModelStructure>{DERIVATIVE}</ModelStructure>"),
             "ModelStructure: index = 9: there are 6 variables",
         ),
+        (
+            ROLES.replace("<ModelStructure/>", f"<ModelStructure>{DERIVATIVE}</ModelStructure>").replace(
+                '"9"', '"-9"'
+            ),
+            "ModelStructure: index = -9: there are 6 variables",
+        ),
+        (SIZED.format('start="two"'), "'x': start = 'two': expected a whole number"),
+        (SIZED.format('valueReference="two"'), "'x': valueReference = 'two': expected a whole number"),
     ],
 )
 def test_wrong_descriptions_are_named(text: str, message: str) -> None:

@@ -4,7 +4,7 @@ from xml.etree import ElementTree
 import pytest
 
 from falsifier.core.files import bundled
-from falsifier.errors import ModelError
+from falsifier.errors import ModelFileError
 from falsifier.fmu.description import archive
 from falsifier.fmu.description.structure import Structure, conversion, read_structure, read_units
 from tests.fixtures.archives import packed
@@ -42,11 +42,21 @@ def test_outputs_depend_on_the_inputs_that_the_fmu_lists(major: int) -> None:
     assert structure(path(f"Lag_{major}")).inputs_of == {}, "it does not say a word about its output"
 
 
-@pytest.mark.parametrize("wrong", ['index="99" dependencies="1"', 'index="3" dependencies="99"'])
-def test_wrong_references_are_one_clear_error(wrong: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("right", "wrong", "said"),
+    [
+        ('index="3" dependencies="1 2"', 'index="99" dependencies="1"', "there is no '99'"),
+        ('index="3" dependencies="1 2"', 'index="3" dependencies="99"', "there is no '99'"),
+        ('BaseUnit m="1"', 'BaseUnit m="one"', "Unit 'm': m = 'one': expected a whole number"),
+    ],
+)
+def test_wrong_references_and_units_are_one_clear_error(
+    right: str, wrong: str, said: str, tmp_path: Path
+) -> None:
     text = archive.read_entry(path("Gain_2"), "modelDescription.xml").decode()
-    file = written(tmp_path, text.replace('index="3" dependencies="1 2"', wrong))
-    with pytest.raises(ModelError, match=r"a\.fmu: units or dependencies .* do not follow the standard"):
+    file = written(tmp_path, text.replace(right, wrong))
+    expected = rf"a\.fmu: units or dependencies .* do not follow the standard \({said}\)"
+    with pytest.raises(ModelFileError, match=expected):
         structure(file)
 
 

@@ -265,10 +265,10 @@ WRONG = {
     "DefaultExperiment: stopTime: 'late' is not a": structure(
         system(PLANT), after='<ssd:DefaultExperiment stopTime="late"/>'
     ),
-    "SystemStructure.ssd: unit 'mm': ValueError: could not": structure(
+    "SystemStructure.ssd: Unit 'mm': factor = 'small': expected a number": structure(
         system(PLANT), after=MILLIMETRE.replace("0.001", "small")
     ),
-    "SystemStructure.ssd: unit None: KeyError: 'name'": structure(
+    "SystemStructure.ssd: Unit '': name is missing": structure(
         system(PLANT), after=MILLIMETRE.replace('name="mm"', "")
     ),
     "nested more than 400 deep": structure(DEEP),
