@@ -126,11 +126,12 @@ def run(
 def resume(
     *, directory: Path, jobs: int, budget: int | None, totals: "Budget | None", quiet: bool, as_json: bool
 ) -> None:
-    """Continue the run or campaign in DIRECTORY; no recorded simulation or question is repeated.
+    """Continue the run or campaign in DIRECTORY.
 
-    A run keeps its limits; only --budget replaces the limit on simulations, even if the run has ended.
-    --jobs and --total apply to campaigns only. Totals of simulations, tokens and cost include
-    what was spent before.
+    No recorded question is asked again, and no recorded simulation is repeated unless its trajectory is
+    needed and was not kept. A run keeps its limits; only --budget replaces the limit on simulations, even
+    if the run has ended. --jobs and --total apply to campaigns only. Totals of simulations, tokens and cost
+    include what was spent before.
     """
     from falsifier.campaigns import resume_campaign
     from falsifier.campaigns.directory import is_campaign
