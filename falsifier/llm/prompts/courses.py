@@ -268,7 +268,7 @@ def _swing(times: Array, column: Array, turns: list[int], allowed: Array) -> Swi
     high = [k for k, up in zip(turns[1:], rising, strict=True) if up]
     low = [k for k, up in zip(turns[1:], rising, strict=True) if not up]
     (low if rising[0] else high).insert(0, turns[0])
-    periods = 2 * np.diff(times[turns])
+    periods = times[turns[2:]] - times[turns[:-2]]  # rises and falls may differ
     return Swing(
         float(times[turns[0]]),
         float(times[turns[-1]]),
