@@ -133,4 +133,5 @@ def test_digits_follow_the_margin_and_times_show_a_hundredth_of_the_simulation()
     assert column_decimals(pressure) == 2
     assert column_decimals(pressure, margin=0.037) == 4
     assert column_decimals(pressure, margin=1e-30) <= 8
+    assert column_decimals(1e6 + 1e-4 * pressure) == 5, "else all of them read as one"
     assert [coarse_clock(stop) for stop in (1000.0, 50.0, 3.0, 0.3)] == [0, 1, 2, 3]
