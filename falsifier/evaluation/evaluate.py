@@ -221,7 +221,7 @@ def check_evaluation(problem: Problem, evaluation: Evaluation) -> None:
 
 
 def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
-    """Initialise the model at both ends of the search space, and read the outputs at time 0.
+    """Initialise the model at both ends of the search space and between, and read the outputs at time 0.
 
     The model takes one output step at most, a system as many as its slowest component needs for one. What
     cannot be initialised is left out: the search itself reports such failures.
@@ -232,9 +232,12 @@ def start_values(problem: Problem) -> dict[str, tuple[float, float]]:
     space, experiment = problem.space, problem.experiment
     brief = replace(experiment, stop_time=_shortest(problem))
     found: list[dict[str, float]] = []
-    for corner in space.bounds.T:
+    low, high = space.bounds.T
+    # Differences are often the same at both ends: between, each dimension has another share of its range.
+    between = low + np.random.default_rng(0).random(len(low)) * (high - low)
+    for point in (low, high, between):
         with suppress(CandidateError, ModelError, SimulationError):
-            candidate = space.decode(corner)
+            candidate = space.decode(point)
             outputs = problem.model.simulate(candidate.signals, numbers(problem, candidate), brief)
             found.append(outputs.at(0.0))
     names = [name for name in experiment.outputs if found and name in found[0]]

@@ -134,6 +134,8 @@ class TestSimulate:
 def test_outputs_at_time_0_and_whether_they_depend_on_what_is_chosen() -> None:
     assert start_values(lag_problem()) == {"x": (0.0, 0.0)}
     assert start_values(lag_problem(parameters=[START])) == {"x": (START.low, START.high)}
+    low, high = start_values(lag_problem(inputs=2, response=lambda _, u, __: {"x": u["u"] - u["v"]}))["x"]
+    assert low < high, "a difference that is the same at both ends of the search space"
 
 
 def test_an_fmu_is_initialised_without_a_whole_simulation() -> None:

@@ -18,9 +18,7 @@ Array = NDArray[np.float64]
 Points = tuple[tuple[float, float, float], ...]
 
 # Changes listed individually; of longer lists the beginning and the end.
-_SHOWN_CHANGES = 16
-# Decimals of times, if fewer would give two breakpoints the same time.
-_FINEST_CLOCK = 6
+SHOWN_CHANGES = 16
 # Breakpoints of one signal; a signal that needs more is told less exactly, and how exactly.
 MOST_BREAKPOINTS = 24
 _MOST_ENVELOPE_POINTS = 16
@@ -57,8 +55,8 @@ def change_list(times: Array, column: Array, *, clock: int, label: Label = lambd
     if not rest:
         return f"constant {begin}"
     changes = [f"{label(v, plain(v, 6))} from {plain(start, clock)} s" for v, start, _ in rest]
-    if len(changes) >= _SHOWN_CHANGES:
-        half = _SHOWN_CHANGES // 2
+    if len(changes) >= SHOWN_CHANGES:
+        half = SHOWN_CHANGES // 2
         left_out = f"{len(changes) + 1 - 2 * half} more changes"
         changes = [*changes[: half - 1], left_out, *changes[-half:]]
     return f"{begin}, then {', '.join(changes)}"
@@ -268,7 +266,7 @@ def _swing(times: Array, column: Array, turns: list[int], allowed: Array) -> Swi
     high = [k for k, up in zip(turns[1:], rising, strict=True) if up]
     low = [k for k, up in zip(turns[1:], rising, strict=True) if not up]
     (low if rising[0] else high).insert(0, turns[0])
-    periods = 2 * np.diff(times[turns])
+    periods = times[turns[2:]] - times[turns[:-2]]  # rises and falls may differ
     return Swing(
         float(times[turns[0]]),
         float(times[turns[-1]]),
@@ -319,6 +317,6 @@ def _pairs(points: Points, clock: int) -> str:
     ]
     while True:
         told = list(zip((plain(time, clock) for time, _, _ in points), values, strict=True))
-        if clock >= _FINEST_CLOCK or not any(a[0] == b[0] and a[1] != b[1] for a, b in pairwise(told)):
+        if not any(a[0] == b[0] and a[1] != b[1] for a, b in pairwise(told)):
             return " ".join(dict.fromkeys(f"{time}:{value}" for time, value in told))
         clock += 1

@@ -28,6 +28,8 @@ _ROUNDED_DIGITS = 15
 # Digits of the width of a range to which values of signals and parameters are shown.
 _DIGITS_OF_RANGE = 4
 _DIGITS_OF_PARAMETER = 5
+# Below this, numbers are written with exponents, as formulas write them.
+_TINY = 1e-4
 # Switches of a signal up to which every one is told; of others those by more than a share of the range.
 _MOST_PIECES = 12
 _ROUGHLY = 0.02
@@ -46,11 +48,13 @@ def decimals_for(scale: float, digits: int = _COLUMN_DIGITS) -> int:
 
 
 def column_decimals(column: NDArray[np.float64], *, margin: float | None = None) -> int:
-    """Decimals needed to show a column's values, and a margin of this size between two of them."""
-    usual = decimals_for(float(np.abs(column).max()))
-    if margin is None or is_on_limit(margin):
-        return usual
-    return min(max(usual, decimals_for(margin, 3)), decimals_for(float(np.abs(column).max()), 9))
+    """Decimals needed to show a column's values and how they differ, and a margin between two of them."""
+    largest, span = float(np.abs(column).max()), float(np.ptp(column))
+    needed = max(decimals_for(largest), decimals_for(span, 2))
+    if margin is not None and not is_on_limit(margin):
+        most = max(decimals_for(largest, 9), decimals_for(span))
+        needed = max(needed, min(decimals_for(margin, 3), most))
+    return min(needed, decimals_for(largest, _ROUNDED_DIGITS))
 
 
 def coarse_clock(stop_time: float) -> int:
@@ -63,15 +67,16 @@ def coarse_clock(stop_time: float) -> int:
 
 
 def plain(value: float, decimals: int) -> str:
-    """Number with at most that many decimals, without trailing zeros.
+    """Number with at most that many decimals, without trailing zeros; a tiny one without leading ones.
 
-    >>> plain(8.3333, 2), plain(50.0, 2), plain(-0.0001, 2)
-    ('8.33', '50', '0')
+    >>> plain(8.3333, 2), plain(50.0, 2), plain(-0.0001, 2), plain(0.00001063, 7)
+    ('8.33', '50', '0', '1.06e-05')
     """
     text = f"{value:.{decimals}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text
+    rounded = float(text)
+    return text if abs(rounded) >= _TINY else number(rounded) if rounded else "0"
 
 
 def bounds(low: float, high: float, digits: int = _BOUND_DIGITS) -> tuple[str, str]:

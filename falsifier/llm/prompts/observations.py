@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import in_unit
 from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts import courses
 from falsifier.llm.prompts.courses import Array
@@ -137,8 +138,8 @@ def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> s
         if name not in told:  # a search may record more
             continue
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
-        unit = f" {unit}" if (unit := view.variable(name).unit) else ""
-        there.append(f"{name} = {view.labelled(name, value, plain(value, decimals))}{unit}")
+        told_value = view.labelled(name, value, plain(value, decimals))
+        there.append(f"{name} = {in_unit(told_value, view.variable(name).unit)}")
     time = plain(diagnosis.critical_time, _clock(view))
     return f"{'all ' * (not view.untold)}signals at t = {time} s: {', '.join(there)}"
 
@@ -155,7 +156,7 @@ def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array])
         sides = links(step.formula) if isinstance(step.formula, And | Or) else step.formula.children
         sample = round(step.time / view.experiment.output_interval)
         words = (
-            f"{side} robustness {signed(over_time[side].item(sample), 4)}{_scale(view, side)}"
+            f"{side} robustness {in_unit(signed(over_time[side].item(sample), 4), _scale(view, side))}"
             for side in sides
         )
         yield f"{_SIDES[kind]} at t = {plain(step.time, _clock(view))} s: {'; '.join(words)}"
@@ -164,7 +165,7 @@ def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array])
 def _scale(view: View, part: Formula) -> str:
     """Unit of a part's robustness; empty unless all its signals have the same unit."""
     units = {view.variable(name).unit for name in part.signals}
-    return f" {units.pop()}" if len(units) == 1 and units != {""} else ""
+    return units.pop() if len(units) == 1 else ""
 
 
 def _predicates(
@@ -172,10 +173,20 @@ def _predicates(
 ) -> Iterator[str]:
     """When each predicate was false, among the times at which the requirement asks for it.
 
-    Of the one that decided without being false all is told by then.
+    Of the one that decided without being false all is told by then, and of those that compare nothing but a
+    discrete signal whose changes are all listed.
     """
     clock, step = _clock(view), trajectory.step
+    listed = {
+        name
+        for name in view.recorded
+        if name in trajectory.columns
+        and view.is_discrete(name, trajectory[name])
+        and np.count_nonzero(np.diff(trajectory[name])) < courses.SHOWN_CHANGES
+    }
     for predicate in view.requirement.formula.predicates:
+        if len(predicate.signals) == 1 and listed.issuperset(predicate.signals):
+            continue
         asked = ~np.isnan(over_time[predicate])
         margin, times = over_time[predicate][asked], trajectory.times[asked]
         start, end = float(times[0]), float(times[-1])
@@ -193,7 +204,7 @@ def _predicates(
             found = f"false only at {plain(stretch[0], clock)} s"
         else:
             begin, stop = (plain(time, clock) for time in stretch)
-            total = number(round(float(wrong.sum()) * step, 6))
+            total = number(float(wrong.sum()) * step)
             found = f"false for {total} s in total, longest from {begin} to {stop} s"
         yield f"{predicate}, from {plain(start, clock)} to {plain(end, clock)} s: {found}"
 
@@ -313,6 +324,4 @@ def _is_judged(view: View, name: str) -> bool:
 
 def _clock(view: View) -> int:
     """Decimals of times: enough for the output grid, because all times shown are sample times."""
-    return min(
-        6, max(decimals_for(view.space.stop_time, 4), decimals_for(view.experiment.output_interval, 1))
-    )
+    return max(decimals_for(view.space.stop_time, 4), decimals_for(view.experiment.output_interval, 1))

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.literals import one_line
 from falsifier.core.ranges import number_names
 from falsifier.core.words import counted, listed, shortened
 from falsifier.errors import ChatError
@@ -271,7 +272,8 @@ class Questions:
         reason = shortened(" ".join(why.split()), _LONGEST_WHY)
         notes = [self._alike("; ".join(inputs)), f"chosen because: {reason}" if why else ""]
         if verdict is None:
-            text = _text(inputs, f"no verdict, the simulation {evaluation.outcome}".rstrip(": "), *notes)
+            ended = one_line(f"no verdict, the simulation {evaluation.outcome}".rstrip(": "))
+            text = _text(inputs, ended, *notes)
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         trajectory = evaluation.trajectory
         progress = SampleProgress.of(self._view, trajectory) if trajectory else SampleProgress()

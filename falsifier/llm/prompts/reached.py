@@ -9,6 +9,7 @@ from math import fsum
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import resolving
 from falsifier.llm.prompts.numbers import number, plain
 from falsifier.llm.prompts.view import View
 
@@ -89,6 +90,6 @@ class Reached:
             least, most = self._ranges.get(name, (low, high))
             least_new = _FURTHER * (most - least)
             if high > most + least_new:
-                yield f"{name} above {number(most, 3)}"
+                yield f"{name} above {number(most, resolving(most, high - most, 3))}"
             if low < least - least_new:
-                yield f"{name} below {number(least, 3)}"
+                yield f"{name} below {number(least, resolving(least, least - low, 3))}"

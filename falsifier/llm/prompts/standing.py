@@ -12,7 +12,7 @@ from dataclasses import replace
 from falsifier.context.values import Context
 from falsifier.core.ranges import Freedom, InputRange, ParameterRange
 from falsifier.core.words import counted, listed, with_unit
-from falsifier.llm.prompts.numbers import bounds, number
+from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl import Formula, in_words
 from falsifier.stl.formula import Always, And, Eventually, Iff, Implies, Next, Not, Or, Predicate, Until
@@ -77,6 +77,7 @@ _FREE_NOTE = (
     "pieces of equal length if interpolation is constant; one value alone is a constant. Otherwise "
     '"times" gives the time in s of each value, increasing from 0; the last value is held to the stop time.'
 )
+_FIXED_NOTE = ' The control points of {} are fixed: leave "times" empty, and give as many values as shown.'
 _LESSONS_NOTE = (
     '"lessons" is shown to you again in the next question, in place of the earlier one: two or three '
     "sentences on what you know by now of the system and what remains to be tried."
@@ -241,7 +242,7 @@ def _control_times(view: View, r: InputRange) -> str:
     gap = fixed[1] - fixed[0] if len(fixed) > _FEW_TIMES else 0.0
     if gap > 0 and all(abs(t - k * gap) < 1e-6 * view.space.stop_time for k, t in enumerate(fixed)):
         return f"every {number(gap, 5)} s from t = 0"
-    times = [number(round(t, 6)) for t in fixed]
+    times = [plain(t, decimals_for(view.space.stop_time, 7)) for t in fixed]
     if len(times) > _MAX_TIMES:
         times = [*times[:3], "...", times[-1]]
     return f"at t = {', '.join(times)} s"
@@ -299,7 +300,8 @@ def _reply(view: View, count: int) -> Iterator[str]:
             " and ".join(["input"] * bool(space.inputs) + ["parameter"] * bool(space.parameters))
         )
     if any(r.free for r in space.inputs):
-        yield _FREE_NOTE
+        fixed = [r.name for r in space.inputs if not r.free]
+        yield _FREE_NOTE + (_FIXED_NOTE.format(listed(fixed)) if fixed else "")
     yield _LESSONS_NOTE
 
 

@@ -120,9 +120,18 @@ def test_slow_signals_and_ripple_do_not_oscillate() -> None:
     assert oscillations(TIMES, TIMES + 0.15 * np.sin(4 * np.pi * TIMES), slower_than=2.0) == []
 
 
+@pytest.mark.parametrize("periods", [3.3, 6])
+def test_a_period_is_the_time_between_two_peaks_however_fast_a_signal_falls(periods: float) -> None:
+    phase = TIMES / 0.4 % 1
+    saw = np.where(phase < 0.9, phase / 0.9, 10 * (1 - phase)) * (periods * 0.4 > TIMES)
+    (swing,) = oscillations(TIMES, saw, slower_than=2.0)
+    assert swing.periods == pytest.approx((0.4, 0.4))
+
+
 def test_digits_follow_the_margin_and_times_show_a_hundredth_of_the_simulation() -> None:
     pressure = np.array([87.0, 87.463, 90.0])
     assert column_decimals(pressure) == 2
     assert column_decimals(pressure, margin=0.037) == 4
     assert column_decimals(pressure, margin=1e-30) <= 8
+    assert column_decimals(1e6 + 1e-4 * pressure) == 5, "else all of them read as one"
     assert [coarse_clock(stop) for stop in (1000.0, 50.0, 3.0, 0.3)] == [0, 1, 2, 3]

@@ -1,14 +1,17 @@
 """What is seen of one sample, on trajectories made by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.experiment import Experiment
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.engines import make_engine
-from falsifier.evaluation.evaluate import Evaluation, evaluate, monitor_for
+from falsifier.evaluation.evaluate import Evaluation, compiled, evaluate, monitor_for
 from falsifier.llm.prompts.observations import observed
 from falsifier.llm.prompts.view import View
 from falsifier.testing import lag_problem
@@ -43,6 +46,32 @@ def test_it_is_told_why_and_what_all_signals_were_then() -> None:
     lines = facts(*seen("G[0,10] (x <= 2)", np.minimum(TIMES / 4, 1.5)))
     assert "x = 1.5" in line(lines, "why: ")
     assert line(lines, "all signals at t = 6 s: ") == "all signals at t = 6 s: x = 1.5 m, u = 0 V"
+
+
+def test_numbers_without_a_unit_have_none_though_the_fmu_calls_it_one() -> None:
+    view, evaluation = seen("G[0,10] (x <= 2 and u <= 1)", np.minimum(TIMES / 4, 1.5))
+    variables = tuple(replace(v, unit="1") for v in view.info.variables)
+    lines = facts(replace(view, info=replace(view.info, variables=variables)), evaluation)
+    assert line(lines, "all signals at t = 6 s: ").endswith(": x = 1.5, u = 0")
+    assert line(lines, "conjuncts").endswith("x <= 2 robustness +0.5; u <= 1 robustness +1")
+
+
+def test_times_of_microseconds_are_told_apart() -> None:
+    problem = lag_problem("G[0,1e-5] (x <= 0.755 and u <= 1)")
+    space, grid = replace(problem.space, stop_time=1e-5), Experiment(1e-5, 1e-7, ("x",))
+    view = replace(View.of(problem), space=space, experiment=grid)
+    times = view.experiment.times
+    x = np.minimum(times * 1e5, 0.8)
+    trajectory = Trajectory(times, {"x": x, "u": 0 * x})
+    verdict = compiled(view.requirement.formula, 1e-7, 101).evaluate(trajectory)
+    candidate = Candidate({"u": Signal((0.0,), (0.0,), "constant")})
+    lines = facts(view, Evaluation(candidate, "ok", verdict, "", trajectory))
+    assert line(lines, "all signals at t = 8e-06 s: ")
+    assert line(lines, "x <= 0.755, ").endswith(
+        "false for 2.5e-06 s in total, longest from 7.6e-06 to 1e-05 s"
+    )
+    around = line(lines, "x around t = ").partition(" s: ")[2].split()
+    assert len({point.partition(":")[0] for point in around}) == len(around) > 2
 
 
 def test_what_broke_is_told_before_the_condition_that_decided() -> None:
@@ -104,6 +133,14 @@ def test_courses_and_changes_end_where_the_requirement_stops_looking() -> None:
     assert (over_time, around.split()[-1]) == ("x: 0:0 6:6", "6:6")
     (only,) = courses(*seen("x <= 9", TIMES.copy()))
     assert only == "x: constant 0"
+
+
+@pytest.mark.parametrize(("jumps", "is_told"), [(5, False), (20, True)])
+def test_when_a_discrete_signal_was_beyond_its_limit_is_told_unless_its_changes_show_it(
+    jumps: int, *, is_told: bool
+) -> None:
+    lines = facts(*seen("G[0,10] (u <= 1 and x <= 0.5)", np.floor(TIMES * jumps / 10) % 2))
+    assert any(each.startswith("x <= 0.5, from 0") for each in lines) is is_told
 
 
 def test_without_a_trajectory_there_is_the_verdict_alone() -> None:

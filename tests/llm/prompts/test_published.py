@@ -95,7 +95,7 @@ def test_digits_are_the_published_ones() -> None:
     tiny = replace(trajectory, columns={**trajectory.columns, "x": 1e-3 * trajectory["x"]})
     changed = replace(evaluation, trajectory=tiny, verdict=replace(evaluation.verdict, critical_time=5.0))
     _, changing = told(problem, "MP4", [changed])
-    assert "u = [0.333, 0, 0, 0]; x0 = 0.00002" in changing, "more than three decimals in a narrow range"
+    assert "u = [0.333, 0, 0, 0]; x0 = 2e-05" in changing, "more than three decimals in a narrow range"
     assert "x: 0.000 at 0.0 s, " in changing, (
         "a value that is not zero does not read as zero with one decimal"
     )

@@ -118,6 +118,12 @@ def test_what_few_samples_reached_counts_more_than_much_that_many_did() -> None:
     assert reached.rank(rare) > reached.rank(usual)
 
 
+def test_in_a_narrow_range_it_is_told_from_where_on_a_value_is_new() -> None:
+    reached = Reached(View.of(PROBLEM))
+    reached.news(SampleProgress(ranges={"x": (1e6, 1e6 + 0.004)}))
+    assert reached.news(SampleProgress(ranges={"x": (1e6, 1e6 + 0.006)})) == ("x above 1000000.004",)
+
+
 def test_on_a_plateau_samples_rank_by_what_their_signals_did() -> None:
     problem = transmission("AT51")[0]
     still, brisk = [0.0] * 7 + [325.0] * 3, [100.0] * 7 + [0.0] * 3
@@ -130,7 +136,7 @@ def test_on_a_plateau_samples_rank_by_what_their_signals_did() -> None:
 
 
 def test_failed_samples_rationales_lessons_and_inputs_that_look_alike() -> None:
-    failed = Evaluation(PROBLEM.space.decode([1] * 5), "crashed", reason="division by zero")
+    failed = Evaluation(PROBLEM.space.decode([1] * 5), "crashed", reason="division\nby zero")
     _, only = told(PROBLEM, "MP5", [failed])
     assert "no verdict, the simulation crashed: division by zero" in only and "output values" not in only
     assert "crashed" not in told(PROBLEM, "MP4", [failed])[1]

@@ -138,6 +138,18 @@ def test_whole_numbers_are_asked_for() -> None:
     assert "; one of the numbers 1 = low, 2 = top; " in gears
 
 
+def test_times_of_fixed_control_points_and_whose_they_are() -> None:
+    assert "at t = 0, 3.33333, 6.66667, 10 s" in standing(lag_problem())
+    short = View.of(lag_problem())
+    short = replace(short, space=replace(short.space, stop_time=1e-5))
+    assert "at t = 0, 3.33333e-06, 6.66667e-06, 1e-05 s" in standing(short)
+    problem = lag_problem(inputs=2, free=FREE)
+    u, v = problem.space.inputs
+    space = replace(problem.space, inputs=(replace(u, free=None), v))
+    assert "The control points of u are fixed" in standing(replace(problem, space=space))
+    assert "are fixed" not in standing(problem)
+
+
 def test_start_values_are_told_if_they_do_not_depend_on_what_is_chosen() -> None:
     problem = lag_problem()
     assert "; at t = 0: 0.25\n" in standing(problem, start={"x": (0.25, 0.25)})
