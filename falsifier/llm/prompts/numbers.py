@@ -76,7 +76,7 @@ def plain(value: float, decimals: int) -> str:
     if "." in text:
         text = text.rstrip("0").rstrip(".")
     rounded = float(text)
-    return text if abs(rounded) >= _TINY else number(rounded) if rounded else "0"
+    return text if abs(rounded) >= _TINY else number(rounded, _ROUNDED_DIGITS) if rounded else "0"
 
 
 def bounds(low: float, high: float, digits: int = _BOUND_DIGITS) -> tuple[str, str]:
