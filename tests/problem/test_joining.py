@@ -341,6 +341,9 @@ def test_what_belongs_to_a_clock_that_never_ticks_cannot_be_required() -> None:
         SpecError, match=r"'sampled' changes only when a clock ticks, .* name a variable without"
     ):
         parse_requirement("G (sampled > 1)", info, Experiment(1.0, 0.1, ()))
+    problem = Problem.from_fmu(fixture("ClocksAndBinary_3"), "G (y <= 1)")
+    with pytest.raises(SpecError, match="stl: 'sampled' changes only when a clock ticks"):
+        problem.with_requirement("G (sampled > 1)")
 
 
 def test_strings_are_no_numbers() -> None:
