@@ -346,6 +346,11 @@ def test_what_belongs_to_a_clock_that_never_ticks_cannot_be_required() -> None:
         problem.with_requirement("G (sampled > 1)")
 
 
+def test_too_short_a_stop_time_is_not_blamed_on_the_interval() -> None:
+    with pytest.raises(SpecError, match=r"^stop_time: stop_time = 1e-11 s is so short"):
+        Problem.from_fmu(fixture("Lag_2"), "G (y <= 1)", stop_time=1e-11, output_interval=0.1)
+
+
 def test_strings_are_no_numbers() -> None:
     variables = Variable("out", "string", "output"), Variable("in", "string", "input"), Variable("x")
     info = ModelInfo("m", variables=variables)
