@@ -153,9 +153,9 @@ def test_start_values_and_items_that_cannot_all_be_used_are_noted() -> None:
         ),
         (
             ROLES.replace("<ModelStructure/>", f"<ModelStructure>{DERIVATIVE}</ModelStructure>").replace(
-                '"9"', '"-9"'
+                '"9"', '"0"'
             ),
-            "ModelStructure: index = -9: there are 6 variables",
+            "ModelStructure: index = 0: there are 6 variables",
         ),
         (SIZED.format('start="two"'), "'x': start = 'two': expected a whole number"),
         (SIZED.format('valueReference="two"'), "'x': valueReference = 'two': expected a whole number"),
