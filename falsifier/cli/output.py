@@ -85,19 +85,14 @@ def stop_at_interrupts() -> None:
 def end_at_interrupts(code: int) -> None:
     """Let Ctrl-C end the program at once with this exit code, which is settled."""
     for number in _STOPPING:
-        if signal.getsignal(number) in (_interrupt, _end):
+        if signal.getsignal(number) is _interrupt:
             signal.signal(number, lambda _signal, _frame: os._exit(code))
 
 
-def _interrupt(_signal: int, _frame: FrameType | None) -> NoReturn:
-    _INTERRUPTED_AT.append(monotonic())
-    for each in _STOPPING:
-        if signal.getsignal(each) is _interrupt:
-            signal.signal(each, _end)
-    raise KeyboardInterrupt
-
-
-def _end(number: int, _frame: FrameType | None) -> None:
+def _interrupt(number: int, _frame: FrameType | None) -> None:
+    if not _INTERRUPTED_AT:
+        _INTERRUPTED_AT.append(monotonic())
+        raise KeyboardInterrupt
     if number != signal.SIGINT and monotonic() - _INTERRUPTED_AT[-1] < _SAME:
         return
     with suppress(OSError):

@@ -218,8 +218,9 @@ def _experiment(
         raise SpecError(f"the {info.noun} has no default stop time; add this key", key="model.stop_time")
     output_interval, step_size, grid = stated("output_interval"), stated("step_size"), None
     changed = [k for k in ("output_interval", "step_size", "stop_time") if getattr(changes, k) is not None]
-    with naming(setting(changed[0]) if changed else None):
+    with naming(setting("stop_time") if changes.stop_time is not None else None):
         check_steps(stop_time, stop_time, key="model.stop_time")
+    with naming(setting(changed[0]) if changed else None):
         if output_interval is None:
             times = formula_times(formulas_of(stop_time))
             steps = {"fmu_step": info.step_size, "internal_step": info.internal_step}

@@ -14,9 +14,9 @@ from falsifier.core.model import Interface, Model, ModelInfo, Variable
 from falsifier.core.ranges import number_names
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import ends
-from falsifier.errors import SpecError, did_you_mean
+from falsifier.errors import SpecError, did_you_mean, in_section
 from falsifier.fmu import System
-from falsifier.problem.requirement import Requirement
+from falsifier.problem.requirement import Requirement, check_comparable
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
 from falsifier.problem.source import STL_NAME, ProblemSource
 from falsifier.stl import Formula
@@ -299,6 +299,8 @@ def _check_variables(problem: Problem) -> None:
                 f"{problem.name}: the formula names {name!r}, which is neither an input nor recorded: add it "
                 "to the experiment's outputs"
             )
+        with in_section(problem.name):
+            check_comparable(info[name])
 
 
 def check_limits(problem: Problem) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from falsifier.core.arguments import instance
 from falsifier.core.experiment import Experiment
 from falsifier.core.literals import one_line
-from falsifier.core.model import ModelInfo
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.errors import FormulaError, SpecError, did_you_mean, in_section, setting
 from falsifier.problem.grid import fitting_interval
 from falsifier.problem.spec import NAME_IN_LINES, AnyRequirement
@@ -76,13 +76,7 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
             )
         if name not in info:
             raise SpecError(_unknown(name, info))
-        if info[name].kind == "string":
-            raise SpecError(f"{name!r} is a string, and formulas compare numbers")
-        if info[name].is_clocked:
-            raise SpecError(
-                f"{name!r} changes only when a clock ticks, which is not simulated here; name a variable "
-                "without a clock, or export the model without this one"
-            )
+        check_comparable(info[name])
     # One input has one name, whose values are known at every sample without asking the model.
     variables = [info[name] for name in formula.signals]
     numbers = [Flag.of(Name(v.name)) for v in variables if v.kind != "boolean" and v.limits != (0.0, 1.0)]
@@ -98,6 +92,17 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
         advice = f"; {setting('output_interval', f'{fits:.12g}')} fits all times" if is_other else ""
         raise SpecError(f"{error}{advice}") from None
     return formula
+
+
+def check_comparable(variable: Variable) -> None:
+    """Check that formulas can compare what a variable is in a simulation; SpecError if not."""
+    if variable.kind == "string":
+        raise SpecError(f"{variable.name!r} is a string, and formulas compare numbers")
+    if variable.is_clocked:
+        raise SpecError(
+            f"{variable.name!r} changes only when a clock ticks, which is not simulated here; name a "
+            "variable without a clock, or export the model without this one"
+        )
 
 
 def section_formulas(sections: Iterable[AnyRequirement], stop_time: float) -> list[str]:

@@ -95,7 +95,7 @@ class Rise(Template):
     signal: Term = _SIGNAL
     reference: Term = _REFERENCE
     reaches: Margin = Field(
-        "90%", description="Share of the reference to reach, as a percentage; required if down, or below 0."
+        "90%", description="Percentage of the reference to reach; required if down, or of one below 0."
     )
     time: Duration = Field(description="Maximum time in s until it is reached.")
     direction: Literal["up", "down"] = Field("up", description="down: it falls to that share.")
@@ -107,7 +107,7 @@ class Rise(Template):
             raise ValueError(f"reaches is a percentage of the reference such as '90%', got {self.reaches!r}")
         is_negative = isinstance(self.reference, float) and self.reference < 0
         if (self.direction == "down" or is_negative) and "reaches" not in self.model_fields_set:
-            of = self.reference if isinstance(self.reference, float) else 20
+            of = (isinstance(self.reference, float) and self.reference) or 20
             raise ValueError(
                 "with direction = 'down' or a negative reference, state reaches as well: "
                 f"'110%' of {of:.12g} is {tidy(1.1 * of):.12g}, '90%' of it {tidy(0.9 * of):.12g}"

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from math import inf
 from pathlib import Path
@@ -25,6 +25,8 @@ from falsifier.search.steps import Steps
 
 # If this many first simulations all fail, the model is broken or set up wrongly, and the run ends.
 _MAX_INITIAL_FAILURES = 10
+# In s; to see to it that a shorter simulation is recorded would cost more than to repeat one after Ctrl-C.
+_WORTH_KEEPING = 0.1
 
 
 def search(
@@ -277,7 +279,7 @@ class _Loop:
         is faster. Those that are still under way when the search ends are not counted.
         """
         evaluation = wait()
-        with undisturbed():  # it is recorded: its simulation may have taken hours
+        with undisturbed() if evaluation.seconds >= _WORTH_KEEPING else nullcontext():
             # Also against the one whose engine proposed it, because a resumed run needs that verdict.
             judges = standing if asked in standing else [asked, *standing]
             judged = [(s, evaluation if s is asked else judge(s.problem, evaluation)) for s in judges]

@@ -248,6 +248,6 @@ def _problem(program: Program, buffer: Floats, predicate: Predicate, location: L
     values = ", ".join(f"{side} = {float(side.evaluate(here)):g}" for side in sides)
     return (
         f"{predicate} has no finite value at {readable(sample * program.step)} s, where {values}; "
-        "the operands of /, sqrt, log, exp and ^ must stay in their domain, which no condition ensures: "
-        "write x/max(y, 0.001), for example"
+        "the operands of /, sqrt, log, exp and ^ must stay in their domain, also where a condition of the "
+        "formula is false: write x/max(y, 0.001), for example"
     )

@@ -69,3 +69,24 @@ def test_a_step_is_completed_before_the_first_interrupt(interrupts: int, done: l
         steps.append("two")
     assert steps == done
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [
+        [signal.SIGTERM, signal.SIGTERM],  # as timeout sends it, to the command and to its group
+        [signal.SIGINT, signal.SIGTERM],  # a handler of the user's may go on
+    ],
+)
+def test_what_comes_during_a_step_is_told_after_it(sent: list[signal.Signals]) -> None:
+    told: list[object] = []
+    before = {number: signal.signal(number, lambda number, _: told.append(number)) for number in set(sent)}
+    try:
+        with posix.undisturbed(), posix.undisturbed():
+            for number in sent:
+                signal.raise_signal(number)
+            told.append("step")
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    assert told == ["step", *sent]

@@ -251,7 +251,11 @@ def test_numbers_as_text_are_no_parameters() -> None:
     ("variable", "value", "message"),
     [
         (Variable("n", "integer", "input"), 1.5, "n = 1.5: expected an integer for 'n'"),
-        (Variable("n", "integer", "input"), 2**53 + 1, r"an integer from -\d+ to 9007199254740991 \("),
+        (
+            Variable("n", "integer", "input", type="Int64"),
+            2**53 + 2,
+            r"an integer from -\d+ to 9007199254740991 \(",
+        ),
         (Variable("n", "integer", "input", type="Integer"), 2**31, "from -2147483648 to 2147483647 for"),
         (Variable("n", "boolean", "input"), 2, "n = 2: expected 0 or 1 for 'n'"),
         (Variable("n", "enumeration", "input", literals={"Off": 1, "On": 7}), 5, "one of 1 = Off, 7 = On"),

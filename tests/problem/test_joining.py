@@ -341,6 +341,14 @@ def test_what_belongs_to_a_clock_that_never_ticks_cannot_be_required() -> None:
         SpecError, match=r"'sampled' changes only when a clock ticks, .* name a variable without"
     ):
         parse_requirement("G (sampled > 1)", info, Experiment(1.0, 0.1, ()))
+    problem = Problem.from_fmu(fixture("ClocksAndBinary_3"), "G (y <= 1)")
+    with pytest.raises(SpecError, match="stl: 'sampled' changes only when a clock ticks"):
+        problem.with_requirement("G (sampled > 1)")
+
+
+def test_too_short_a_stop_time_is_not_blamed_on_the_interval() -> None:
+    with pytest.raises(SpecError, match=r"^stop_time: stop_time = 1e-11 s is so short"):
+        Problem.from_fmu(fixture("Lag_2"), "G (y <= 1)", stop_time=1e-11, output_interval=0.1)
 
 
 def test_strings_are_no_numbers() -> None:

@@ -59,6 +59,10 @@ def test_a_journal_is_read_on_from_the_line_at_which_reading_was_interrupted(
         ([asked(0, 2), evaluated(1, 0.0)], "line 2 .* are missing"),
         ([asked(1, 1)], "line 1 .* are missing"),
         ([asked(0, 1), confirmed(0, "confirmed", "", Spent())], "line 2 .*: simulation 0, which it confirms"),
+        (
+            [asked(0, 1), evaluated(0, 0.0), confirmed(-1, "confirmed", "", Spent())],
+            "line 3 .*: simulation -1, which it confirms",
+        ),
     ],
 )
 def test_a_journal_whose_records_do_not_follow_each_other_is_damaged(

@@ -19,7 +19,7 @@ from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.problem import Problem
 from falsifier.record.files import recorded_trajectory
 from falsifier.record.journal import read_journal
-from falsifier.record.records import EvaluatedRecord
+from falsifier.record.records import EndedRecord, EvaluatedRecord
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event
@@ -72,8 +72,12 @@ def test_a_run_that_is_stopped_while_it_is_repeated_has_spent_what_it_had(tmp_pa
     journal = (tmp_path / "journal.jsonl").read_bytes()
     (stopped,) = resume(tmp_path, problems=[PROBLEM], chat=ScriptedChat([]), listeners=stop_after(2))
     assert stopped.status == "interrupted" and (tmp_path / "journal.jsonl").read_bytes() == journal
-    (longer,) = resume(tmp_path, problems=[PROBLEM], chat=ScriptedChat(replies[4:]), budget=5)
+    (longer,) = resume(
+        tmp_path, problems=[PROBLEM], chat=ScriptedChat(replies[4:]), budget=6, listeners=stop_after(5)
+    )
     assert longer.spent.calls == 5
+    last = read_journal(tmp_path)[-1]
+    assert isinstance(last, EndedRecord) and last.status == "interrupted", "it went on before it was stopped"
 
 
 def test_resume_with_another_seed_is_refused(tmp_path: Path) -> None:

@@ -122,6 +122,7 @@ def test_what_was_simulated_is_recorded_before_ctrl_c_ends_the_run(
         return original(*arguments, **options)
 
     monkeypatch.setattr(f"falsifier.{within}", interrupted)
+    monkeypatch.setattr("falsifier.search.loop._WORTH_KEEPING", 0.0)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         problems = [lag_problem(name="A"), lag_problem(name="B")]

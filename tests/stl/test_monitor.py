@@ -200,7 +200,7 @@ def test_a_verdict_holds_no_nan_of_a_signal_that_the_formula_does_not_name() -> 
 )
 def test_predicates_outside_their_domain_are_errors(text: str) -> None:
     t = trajectory(x=[-1.0 if "sqrt" in text else 1.0] * 3)
-    with pytest.raises(MonitorError, match=r"no finite value at 0 s, where .* write x/max\(y"):
+    with pytest.raises(MonitorError, match=r"no finite value at 0 s, where .* where a condition .* x/max\(y"):
         Monitor(parse(text), 1.0, 3).evaluate(t)
 
 

@@ -251,10 +251,9 @@ def _doubt(v: Variable) -> str:
         return ""
     if not isfinite(start):
         return f"start of {v.name!r} is {start}"
-    # Integers that are no exact doubles follow the standard, but cannot be compared here.
-    excess, expected = v.excess(start, start), v.expected(start)
-    if v.kind == "integer" and expected:
+    if v.type in ("Int64", "UInt64") and abs(start) >= 2**53:  # as the standard has it, but no exact double
         return ""
+    excess, expected = v.excess(start, start), v.expected(start)
     return f"start = {start:g} {excess}" if excess else expected and f"start = {start:g}: {expected}"
 
 

@@ -118,13 +118,15 @@ def test_start_values_and_items_that_cannot_all_be_used_are_noted() -> None:
         <Float64 name="x" valueReference="1" causality="parameter" variability="fixed" start="7 8 9">
           <Dimension start="2"/></Float64>
         <Enumeration name="e" valueReference="2" causality="input" declaredType="E" start="5"/>
+        <Int8 name="i" valueReference="3" causality="input" start="300"/>
         </ModelVariables><ModelStructure/></fmiModelDescription>"""
     description = described(text)
     assert description.arrays[1] == (7.0, 8.0)
     assert description.info.notes == (
         "the description contradicts itself: an enumeration has 2 items named 'b', of which the last counts, "
         "'x' has 3 start values for 2 elements, so the last ones are ignored, "
-        "start = 5: expected one of 3 = a, 100 = b for 'e'",
+        "start = 5: expected one of 3 = a, 100 = b for 'e', "
+        "start = 300 exceeds the range of the type Int8 of 'i', [-128, 127]",
     )
     with pytest.raises(ModelError, match="'x': start has 3 values for 4 elements"):
         described(text.replace('Dimension start="2"', 'Dimension start="4"'))
@@ -151,9 +153,9 @@ def test_start_values_and_items_that_cannot_all_be_used_are_noted() -> None:
         ),
         (
             ROLES.replace("<ModelStructure/>", f"<ModelStructure>{DERIVATIVE}</ModelStructure>").replace(
-                '"9"', '"-9"'
+                '"9"', '"0"'
             ),
-            "ModelStructure: index = -9: there are 6 variables",
+            "ModelStructure: index = 0: there are 6 variables",
         ),
         (SIZED.format('start="two"'), "'x': start = 'two': expected a whole number"),
         (SIZED.format('valueReference="two"'), "'x': valueReference = 'two': expected a whole number"),
