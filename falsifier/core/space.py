@@ -173,7 +173,7 @@ class SearchSpace:
         """Check that a candidate has a value for all that is searched, and none outside its range.
 
         Raises:
-            CandidateError: naming the input or parameter that is unknown or missing, or all out of range.
+            CandidateError: naming the input or parameter that is unknown, or all missing or out of range.
         """
         for name in (*candidate.signals, *candidate.parameters):
             if name not in self.names:
@@ -181,7 +181,7 @@ class SearchSpace:
         missing: list[Range] = [r for r in self.inputs if r.name not in candidate.signals]
         missing += [p for p in self.parameters if p.name not in candidate.parameters]
         if missing:
-            raise CandidateError(f"{missing[0].label} is missing")
+            raise CandidateError("; ".join(f"{r.label} is missing" for r in missing))
         outside = [_signal_outside(r, candidate.signals[r.name]) for r in self.inputs]
         for p in self.parameters:
             if is_outside(p, value := candidate.parameters[p.name]):
@@ -196,10 +196,17 @@ class SearchSpace:
         enumerations are rounded to the nearest allowed number; each input gets its hold.
 
         Raises:
-            CandidateError: as of ``check``, or naming an input whose control points the space does not allow.
+            CandidateError: as of ``check``, or naming all inputs whose control points are not allowed.
         """
         self.check(candidate)
-        times = {r.name: self._admitted_times(r, candidate.signals[r.name]) for r in self.inputs}
+        times, unfit = dict[str, tuple[float, ...]](), list[str]()
+        for r in self.inputs:
+            try:
+                times[r.name] = self._admitted_times(r, candidate.signals[r.name])
+            except CandidateError as error:
+                unfit.append(str(error))
+        if unfit:
+            raise CandidateError("; ".join(unfit))
         signals = {r.name: _admitted_signal(r, times[r.name], candidate.signals[r.name]) for r in self.inputs}
         parameters = {p.name: into_range(candidate.parameters[p.name], p) for p in self.parameters}
         return replace(candidate, signals=signals, parameters=parameters)

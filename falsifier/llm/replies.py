@@ -3,7 +3,8 @@
 A prompt asks for signals by name, or for the numbers of a point in order. The other form is read, too.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
@@ -26,8 +27,8 @@ from falsifier.llm.candidate_text import (
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.json_text import schema_of_list, schema_of_object
 
-# Numbers outside of their ranges that are told.
-_MOST_OUTSIDE = 5
+# Defects of a candidate that are told.
+_MOST_DEFECTS = 5
 # Share of a range by which a value may exceed it: prompts show values with few digits.
 _ROUNDING = 1e-3
 _BOOLEAN = {"false": 0, "true": 1}
@@ -102,17 +103,20 @@ class ReplyForm:
             return self._decoded(written.point, written.rationale, origin)
         if not self.named:  # what is wrong with a signal would tell names that were not told
             raise RejectedReplyError(f'expected a list of {len(self.space.dimensions)} numbers as "point"')
-        signals: dict[str, Signal] = {}
+        signals, parameters, defects = dict[str, Signal](), dict[str, float](), list[str]()
         for signal in written.signals:
-            if signal.name in signals:
-                raise RejectedReplyError(f"input {quoted(signal.name)} is given twice")
-            signals[signal.name] = self._signal(signal)
+            with _collecting(defects):
+                if signal.name in signals:
+                    raise RejectedReplyError(f"input {quoted(signal.name)} is given twice")
+                signals[signal.name] = self._signal(signal)
         ranges = {p.name: p for p in self.space.parameters}
-        parameters: dict[str, float] = {}
         for p in written.parameters:
-            if p.name in parameters:
-                raise RejectedReplyError(f"parameter {quoted(p.name)} is given twice")
-            parameters[p.name] = _possible(p.value, ranges[p.name]) if p.name in ranges else p.value
+            with _collecting(defects):
+                if p.name in parameters:
+                    raise RejectedReplyError(f"parameter {quoted(p.name)} is given twice")
+                parameters[p.name] = _possible(p.value, ranges[p.name]) if p.name in ranges else p.value
+        if defects:
+            raise RejectedReplyError(_first(defects))
         try:
             return self.space.admit(Candidate(signals, parameters, origin, written.rationale))
         except CandidateError as error:
@@ -155,8 +159,7 @@ class ReplyForm:
             if not d.low <= value <= d.high
         ]
         if outside and not self.named:
-            more = f"; and {len(outside) - _MOST_OUTSIDE} more" if len(outside) > _MOST_OUTSIDE else ""
-            raise RejectedReplyError("; ".join(outside[:_MOST_OUTSIDE]) + more)
+            raise RejectedReplyError(_first(outside))
         for place, (value, d) in enumerate(zip(numbers, dimensions, strict=True), start=1):
             _check_possible(value, ranges[d.name], f"number {place}")
         try:
@@ -164,6 +167,20 @@ class ReplyForm:
         except CandidateError as error:
             what = str(error) if self.named else "the numbers are no sample: see what was said of each"
             raise RejectedReplyError(what) from None
+
+
+@contextmanager
+def _collecting(defects: list[str]) -> Iterator[None]:
+    """Note a defect and go on: each reply costs, so that one says all that is wrong."""
+    try:
+        yield
+    except RejectedReplyError as rejection:
+        defects.append(str(rejection))
+
+
+def _first(defects: Sequence[str]) -> str:
+    more = len(defects) - _MOST_DEFECTS
+    return "; ".join([*defects[:_MOST_DEFECTS], *([f"and {more} more"] if more > 0 else [])])
 
 
 def _is_truth(ranged: Range) -> bool:

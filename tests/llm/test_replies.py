@@ -78,6 +78,16 @@ def changed(**changes: Any) -> dict[str, Any]:
         (changed(signals=[{"name": "throttle", "values": ["lots"]}]), "'lots' is neither a number nor a run"),
         (changed(parameters=[{"name": "mass", "value": float("nan")}]), "finite"),
         (changed(parameters=[{"name": "mass", "value": v} for v in (950, 1050)]), "'mass' is given twice"),
+        # All that is wrong at once, as each reply costs.
+        (
+            changed(signals=[{"name": "throttle", "values": []}, {"name": "brakes", "values": [0]}]),
+            "'throttle' has no values; unknown input 'brakes'",
+        ),
+        (
+            changed(signals=[{"name": n, "values": [0] * 7} for n in ("throttle", "brake")]),
+            "'throttle': expected .*, got 7 .*; input 'brake': expected .*, got 7 ",
+        ),
+        (changed(signals=[], parameters=[]), "'brake' is missing; parameter 'mass' is missing"),
     ],
 )
 def test_what_is_wrong_is_told(reply: Any, problem: str) -> None:
