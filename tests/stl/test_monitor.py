@@ -249,6 +249,16 @@ def test_a_part_counts_only_when_it_is_asked(text: str, extremes: tuple[float, .
     assert Monitor(parse(text), 1.0, 5).extremes(trajectory(x=[9.0, 1.0, 7.5, 7.0, 1.0]))[1] == extremes
 
 
+def test_the_times_of_extremes_are_in_seconds() -> None:
+    monitor = Monitor(parse("G (x >= 5 or x <= 0)"), 0.5, 5)
+    assert (-4.0, 0.5, 3.0, 1.5) in monitor.extremes(trajectory(0.5, x=[6.0, 1.0, 7.0, 8.0, 7.0]))
+
+
+def test_exactly_on_the_limit_the_sign_of_zero_decides() -> None:
+    found = [Monitor(parse(f"x {c} 5"), 1.0, 1).evaluate(trajectory(x=[5.0])) for c in (">=", ">")]
+    assert [v.violated for v in found] == [False, True]
+
+
 def test_a_batch_is_judged_like_its_trajectories() -> None:
     rng = random.Random(5)
     for seed in range(30_000, 30_040):
