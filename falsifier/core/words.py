@@ -175,14 +175,14 @@ def listed(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
-def first_few(parts: Sequence[str], most: int = 10) -> str:
+def first_few(parts: Sequence[str], most: int = 10, *, between: str = ", ") -> str:
     """Name the first parts, and say how many more there are.
 
     >>> first_few(["a", "b"]), first_few(["a", "b", "c"], most=1)
     ('a, b', 'a and 2 more')
     """
     more = f" and {len(parts) - most} more" if len(parts) > most else ""
-    return f"{', '.join(parts[:most])}{more}"
+    return f"{between.join(parts[:most])}{more}"
 
 
 def aligned(

@@ -14,7 +14,7 @@ from falsifier.core.literals import shortest
 from falsifier.core.ranges import InputRange, Range, nearest_value
 from falsifier.core.signals import INTERPOLATIONS, Signal
 from falsifier.core.space import SearchSpace
-from falsifier.core.words import counted
+from falsifier.core.words import counted, first_few
 from falsifier.errors import CandidateError, SpecError, did_you_mean
 from falsifier.llm.candidate_text import (
     LONGEST_NUMBER,
@@ -116,7 +116,7 @@ class ReplyForm:
                     raise RejectedReplyError(f"parameter {quoted(p.name)} is given twice")
                 parameters[p.name] = _possible(p.value, ranges[p.name]) if p.name in ranges else p.value
         if defects:
-            raise RejectedReplyError(_first(defects))
+            raise RejectedReplyError(first_few(defects, _MOST_DEFECTS, between="; "))
         try:
             return self.space.admit(Candidate(signals, parameters, origin, written.rationale))
         except CandidateError as error:
@@ -159,7 +159,7 @@ class ReplyForm:
             if not d.low <= value <= d.high
         ]
         if outside and not self.named:
-            raise RejectedReplyError(_first(outside))
+            raise RejectedReplyError(first_few(outside, _MOST_DEFECTS, between="; "))
         for place, (value, d) in enumerate(zip(numbers, dimensions, strict=True), start=1):
             _check_possible(value, ranges[d.name], f"number {place}")
         try:
@@ -176,11 +176,6 @@ def _collecting(defects: list[str]) -> Iterator[None]:
         yield
     except RejectedReplyError as rejection:
         defects.append(str(rejection))
-
-
-def _first(defects: Sequence[str]) -> str:
-    more = len(defects) - _MOST_DEFECTS
-    return "; ".join([*defects[:_MOST_DEFECTS], *([f"and {more} more"] if more > 0 else [])])
 
 
 def _is_truth(ranged: Range) -> bool:

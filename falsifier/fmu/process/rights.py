@@ -7,7 +7,7 @@ from pathlib import Path
 from shlex import quote
 
 from falsifier.core.literals import printable
-from falsifier.core.words import listed
+from falsifier.core.words import first_few, listed
 from falsifier.errors import SpecError, did_you_mean, written
 
 # Letters and bits of worker/platform/sandbox.h.
@@ -180,9 +180,8 @@ def read_told(data: bytes) -> Told:
                 refused.append("tried to change the settings of another process, which was refused")
             case b"f":
                 refused.append("tried to start more processes than it may")
-    shown = refused[:_SHOWN_REFUSALS]
-    more = f"; and {len(refused) - len(shown)} more" if len(refused) > len(shown) else ""
-    return Told("; ".join(causes), f"the FMU {'; it '.join(shown)}{more}" if shown else "", enforced)
+    shown = first_few(refused, _SHOWN_REFUSALS, between="; it ")
+    return Told("; ".join(causes), f"the FMU {shown}" if shown else "", enforced)
 
 
 def described(rights: Rights, enforced: int) -> str:
