@@ -341,7 +341,7 @@ def pace_of(signal: Signal, r: Range, stop_time: float) -> str:
     """
     if signal.switches == 0:
         return "constant"
-    if len(signal.times) == 1 or signal.interpolation == "constant":
+    if signal.interpolation == "constant":
         return "steps"
     pieces = signal.held(None).pieces(stop_time)[:-1]
     at = np.diff(signal.times)[:, np.newaxis] * _PER_PIECE

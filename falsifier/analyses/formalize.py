@@ -90,7 +90,7 @@ class Formalized:
 def formalize(target: str, sentence: str, llm: Chat | LLMSettings | str) -> Formalized:
     """Return what a requirement in words may mean, as formulas.
 
-    They are judged on one simulation with the inputs at their start values.
+    Each is judged on a simulation with the inputs at their start values, or else in the middle.
 
     Args:
         target: an FMU, a spec, one of its requirements, or a bundled name.

@@ -90,7 +90,7 @@ def margin(
         vary: formula, or a template and its arguments, with ``{limit}`` in place of the threshold.
         between: smallest and largest threshold.
         engine: name of the engine.
-        budget: maximum number of simulations of all searches together.
+        budget: maximum number of simulations of all searches together, at least 20.
         seed: seed of the engines.
         searched: called after each search with the threshold, whether it was falsified, and the number of
             simulations so far.

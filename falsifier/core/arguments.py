@@ -18,11 +18,9 @@ T = TypeVar("T")
 
 def whole(name: str, given: object, *, least: int) -> int:
     """Return a whole number that a user gave, numpy's too, as an int."""
-    try:
+    with suppress(TypeError):  # of an array of numpy, which has an index only if it is one whole number
         if isinstance(given, SupportsIndex) and not isinstance(given, bool) and index(given) >= least:
             return index(given)
-    except TypeError:  # such as an array of numpy, which has an index only if it is a single whole number
-        pass
     raise SpecError(f"{name}: expected a whole number, at least {least}, got {given!r}")
 
 

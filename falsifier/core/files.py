@@ -23,8 +23,8 @@ _DEVICES = frozenset(
 def file_name(name: str) -> str:
     """Return a name for a file or folder that is safe everywhere: one component, no path, no device.
 
-    Names of letters, digits and ``_ - .`` stay as they are. Of all others a readable part remains, with a
-    hash of the name, so that different names give different files.
+    Most names of letters, digits and ``_ - .`` stay as they are. Of all others a readable part remains, with
+    a hash of the name, so that different names give different files.
 
     >>> file_name("AT1")
     'AT1'

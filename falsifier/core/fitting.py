@@ -41,8 +41,11 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
     for r in space.inputs:
         if r.name not in candidate.signals:
             raise _missing(r)
-        signals[r.name], changed = _fitted_signal(space, r, candidate.signals[r.name])
+        given = candidate.signals[r.name]
+        signals[r.name], changed = _fitted_signal(space, r, given)
         notes += [*changed, *_rounded(r, signals[r.name].values)]
+        if given.hold != r.hold and len(given.times) > 1:
+            notes.append(f"{r.name} is {'not held' if r.hold is None else f'held for {shortest(r.hold)} s'}")
     parameters = {}
     for p in space.parameters:
         value = candidate.parameters.get(p.name, p.nominal)

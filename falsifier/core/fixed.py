@@ -22,7 +22,7 @@ class FixedDict(dict[str, T]):
 
 
 def fixed(array: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a view of an array through which it cannot be changed."""
-    view = array.view()
+    """Return a view of an array through which it cannot be changed; other numbers become floats."""
+    view = np.asarray(array, dtype=np.float64).view()
     view.flags.writeable = False
     return view

@@ -164,7 +164,7 @@ def digits(value: float) -> int:
 
 
 def shortest(value: float) -> str:
-    """Return the shortest text of a number that has its value.
+    """Return a number with the fewest digits that have its value.
 
     >>> shortest(1.1), shortest(2.0), shortest(1e-7)
     ('1.1', '2', '1e-07')

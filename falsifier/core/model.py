@@ -105,7 +105,7 @@ class Variable:
 
     @property
     def type_limits(self) -> tuple[int, int] | None:
-        """Smallest and largest number of its data type; None for reals."""
+        """Smallest and largest number of its data type; None for reals and unknown types."""
         return _TYPE_LIMITS.get(self.type)
 
     @property
@@ -127,7 +127,7 @@ class Variable:
         return ", ".join(f"{number} = {name}" for name, number in self.literals.items())
 
     def number_of(self, word: str) -> float | None:
-        """Return the number that the name of an item, or ``true`` or ``false`` of a Boolean, stands for."""
+        """Return the number that an item's name, or ``true`` or ``false``, stands for; None for others."""
         if self.kind == "boolean":
             return {"false": 0.0, "true": 1.0}.get(word.lower())
         return float(self.literals[word]) if word in self.literals else None

@@ -54,7 +54,7 @@ def lock_file(path: Path, mode: int = 0o600) -> int | None:
     """Create and lock a file; the lock ends with the last process that has the returned descriptor open.
 
     Returns:
-        The descriptor; None if another process has locked the file.
+        The descriptor; None if the file is locked already.
 
     Raises:
         MachineError: if the file system has no locks, as Lustre has none unless it is mounted with them.

@@ -78,8 +78,8 @@ _ENVIRONMENT = re.compile(
 _UNNAMED = (_VALUE, _ASSIGNED, _STATED)
 # Whatever the patterns above find has one of these: a file of some MB is searched for them in much less time.
 _LISTED_HINTS = """
-    sk- pk- rk- hf gsk pplx nvapi xai aiza github_pat_ gho_ ghp_ ghs_ ghu_ ghr_ glpat- xox akia asia
-    _live_ _test_ npm_ key :// eyj secret pass kennwort token credential authorization _pwd _pat
+    sk- pk- rk- hf gsk pplx nvapi xai aiza gho_ ghp_ ghs_ ghu_ ghr_ glpat- xox akia asia _live_ _test_ npm_
+    key :// eyj secret pass kennwort token credential auth _pwd _pat pwd= sig= signature= code=
 """
 _HINTS = tuple(_LISTED_HINTS.split())
 # Environment variables whose values are removed from texts: fewer than those that are kept from FMUs, because

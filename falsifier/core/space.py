@@ -116,7 +116,7 @@ class SearchSpace:
 
     @property
     def candidates(self) -> float:
-        """Number of different candidates; infinite if something is real, or control points may be chosen."""
+        """Number of different candidates; infinite if a real one varies, or control points may be chosen."""
         if any(r.free for r in self.inputs):
             return inf
         counts = {r.name: len(r.numbers) if r.items else r.high - r.low + 1 for r in self.ranges}

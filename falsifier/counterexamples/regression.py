@@ -84,7 +84,7 @@ def check(
     Args:
         problem: what to check.
         engine: name of an engine that does not use a language model; None: the default engine.
-        budget: limits of the search; shrinking may use the same number of simulations again.
+        budget: limits of the search; shrinking may use as many simulations (unlimited: twice those used).
         seed: seed of the engine.
         database: where counterexamples are stored; None: nowhere.
 

@@ -58,7 +58,7 @@ def simplicity(problem: Problem, candidate: Candidate) -> Key:
         + sum(digits(t) for r, s in signals if not problem.space.is_fixed(r, s) for t in s.times),
         # Without the digits of rounding, which would tell apart what is equally far on both sides.
         round(sum(map(abs, distances)), 12),
-        tuple((s.times, s.values) for _, s in signals),
+        tuple((s.times, s.values, s.interpolation) for _, s in signals),
         tuple(v for _, v in parameters),
     )
 

@@ -181,9 +181,9 @@ def _check_types(info: ModelInfo, signals: Mapping[str, Signal], numbers: Mappin
     given = {name: (signal.values, signal.interpolation) for name, signal in signals.items()}
     given |= {name: ((number,), "constant") for name, number in numbers.items()}
     for name, (values, interpolation) in given.items():
-        variable = info[name]
-        if variable.kind == "real":
+        if info.kind(name) == "real":
             continue
+        variable = info[name]
         if variable.kind == "string":
             raise CandidateError(f"{name} is a string, and only numbers can be given here: leave it out")
         if interpolation != "constant" and len(values) > 1:

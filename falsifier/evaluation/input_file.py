@@ -187,7 +187,7 @@ def _sloped(points: Sequence[tuple[float, float]]) -> Signal:
             start = time - step_ramp(time)
             if before[1] != value and kept and kept[-1][0] < start:
                 kept.append((start, before[1]))
-        # On a straight line through the last two points, the middle one changes nothing.
+        # Between two points of the same value, a third one changes nothing.
         if len(kept) > 1 and kept[-2][1] == kept[-1][1] == value:
             kept.pop()
         kept.append((time, value))

@@ -152,7 +152,7 @@ def load_problems(target: str | PathLike[str], *, profile: str | None = None) ->
 
 
 def sources_of(source: ProblemSource) -> list[ProblemSource]:
-    """Return a source per requirement of a spec, or of the one that is named; SpecError if it is no spec."""
+    """Return a source per requirement of a spec; the source itself if it has one, as of an FMU."""
     if source.parts.kind in ("fmu", "python"):
         return [source]
     path, requirement = find_spec(source.target)
@@ -163,7 +163,7 @@ def sources_of(source: ProblemSource) -> list[ProblemSource]:
 
 
 def source_file(source: ProblemSource) -> Path | None:
-    """Return the spec file, SSP package or imported module of a source; None for an FMU."""
+    """Return the spec file, SSP package or imported module of a source; None if there is none."""
     if source.parts.kind == "python":
         file = Path(getattr(sys.modules.get(source.target.split(":")[1]), "__file__", None) or "")
         here = Path.cwd()  # seen from it, as specs are, so that a project can be moved

@@ -47,7 +47,7 @@ class Problem:
         space: what may be varied.
         experiment: how each simulation is run.
         parameters: fixed values of parameters, start values and constant inputs, by name.
-        source: how it was loaded; None if it was made in Python, or changed after it was loaded.
+        source: how it was loaded, before what was changed since; None if it was made in Python.
         notes: what was chosen or ignored when it was loaded and the user should know, in words.
         named_context: what the user named for a language model or an engine to read; see ``problem.context``.
         context: what was read of it.
@@ -105,7 +105,7 @@ class Problem:
             stl: the requirement, in Signal Temporal Logic; or a template with its arguments.
             name: the requirement's name, in results and records.
             inputs: inputs to search or keep constant, by name; see InputChoice. If nothing is to be searched,
-                all real inputs with a min and a max are. Inputs that are connected cannot be searched.
+                all inputs with a min and a max are, and Booleans and enumerations; none that is connected.
             parameters: values of parameters and start values, or ranges to search, by name.
             stop_time: end of each simulation in s; default: the FMU's.
             output_interval: step of the monitored time grid in s; default: the FMU's step, or the next
@@ -218,7 +218,7 @@ class Problem:
 
     @property
     def fingerprint(self) -> str:
-        """SHA-256 of requirement, search space and experiment, and of a system's FMUs and connections."""
+        """SHA-256 of all that results depend on; of an FMU alone its name and interface, not its content."""
         content = (
             self.info.name,
             getattr(self.model, "interface", ""),

@@ -1,6 +1,7 @@
 """The sections of a spec file."""
 
 from collections.abc import Mapping
+from contextlib import suppress
 from math import isfinite
 from numbers import Real
 from typing import Annotated, Any, ClassVar
@@ -36,11 +37,9 @@ def _number_or_word(value: Any) -> float | str:
     if isinstance(value, bool | str):
         return value if isinstance(value, str) else shown(value)
     is_number = isinstance(value, Real)
-    try:
+    with suppress(OverflowError):  # of an integer
         if is_number and isfinite(value):
             return float(value)
-    except OverflowError:  # of an integer
-        pass
     kind = "a finite number" if is_number else "a number or text"
     raise ValueError(f"expected {kind}, got {shown(value)}")
 

@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -244,15 +245,13 @@ def _range(option: str) -> tuple[str, InputChoice]:
     name, equals, said = (part.strip() for part in option.partition("="))
     if name and not equals:
         return name, None
-    try:
+    with suppress(ValueError):  # of the points, or because there is no colon
         low, high, *more = (part.strip() for part in said.split(":"))
         is_scaled = more[:1] and more[0] in get_args(Scale)
         points = more[:1] if is_scaled else map(int, more[:1])
         choice: Any = (_end(low), _end(high), *points, *more[1:])
         if name and low and high and len(more) <= (1 if is_scaled else 2):
             return name, choice
-    except ValueError:  # of the points, or because there is no colon
-        pass
     raise SpecError(
         f"--search {option}: expected NAME=LOW:HIGH[:POINTS[:INTERPOLATION]], for example --search "
         "throttle=0:100:7, or of a parameter NAME=LOW:HIGH:log; to keep it constant: "

@@ -188,7 +188,7 @@ def resume(
 
     Raises:
         JournalError: if the directory contains no run, or the FMU, the spec or the problem has changed.
-        SpecError: if the budget is less than what a run has spent.
+        SpecError: if a run has more simulations already than the budget allows.
     """
     problems = list_of("problems", problems, Problem, "Problem")
     _check_made(engine)

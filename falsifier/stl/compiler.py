@@ -34,7 +34,7 @@ def compile_formula(formula: stl.Formula, *, step: float, samples: int, last: in
     The sampling step is in s; the robustness is needed at the samples from 0 to ``last``.
 
     Raises:
-        FormulaError: naming the window that ends after the trajectory or is not a multiple of the step.
+        FormulaError: naming what ends after the trajectory, is no multiple of the step or no finite number.
     """
     compiler = _Compiler(formula, step, samples, size=len(formula.signals) * samples)
     compiler.demand(formula, 0, last)

@@ -98,7 +98,7 @@ class Formula:
         return tuple(f.window for f in self.walk() if f.window is not None)
 
     def horizon(self, step: float = 0.0) -> float:
-        """Return the minimum length in s of a trajectory on which the formula can be evaluated at time 0.
+        """Return how long in s a trajectory must be at least for the formula to be evaluated at time 0.
 
         An operator without a window extends to the end of any trajectory, and adds nothing.
 

@@ -78,8 +78,8 @@ class Monitor:
             belongs; for a predicate itself.
 
     Raises:
-        FormulaError: if the formula is not parsed, a window extends past the end of the grid or a bound is
-            not a multiple of the step.
+        FormulaError: if the formula is not parsed, needs values after the end of the grid, or has a bound
+            that is no multiple of the step or a constant without a finite value.
         SpecError: if the step is not positive, or samples is no positive whole number.
     """
 
@@ -166,7 +166,7 @@ class Monitor:
             MonitorError: if the trajectory cannot be evaluated.
         """
         part = self.formula if part is None else part
-        last = self.samples - 1 - round(part.horizon(self.step) / self.step)
+        last = max(self.samples - 1 - round(part.horizon(self.step) / self.step), 0)
         program = compile_formula(part, step=self.step, samples=self.samples, last=last)
         return program.root.over(fill(program, trajectory, np.empty(program.size)), 0, last).copy()
 

@@ -67,7 +67,7 @@ def _random(
     formulas: tuple[Formula, ...], step: float, samples: int, ranges: Mapping[str, Interval]
 ) -> Iterator[tuple[dict[str, NDArray[np.int64]], dict[str, Floats]]]:
     """Yield random trajectories, each signal of shape (m, samples), and the samples where they change."""
-    names = list(dict.fromkeys(name for f in formulas for name in f.signals))
+    names = list(dict.fromkeys(name for f in formulas for name in f.signals)) or [""]  # of numbers alone
     levels = {name: _levels(formulas, ranges.get(name, Interval())) for name in names}
     moments = _moments(formulas, step, samples)
     rng = np.random.default_rng(0)

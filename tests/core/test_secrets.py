@@ -96,6 +96,7 @@ def test_the_line_of_a_held_secret_is_found(monkeypatch: pytest.MonkeyPatch) -> 
         "https://example.org/a?token=secret1",
         f"https://example.org/{'a' * 300}?clientsecret=secret1",
         "Authorization: Bearer abcdefgh",
+        *(f"GET /v1?x=1&{name}=abcdefgh" for name in ("sig", "signature", "auth", "pwd", "code")),
         *(f"limit = {key}" for key in KEYS),
     ],
 )

@@ -290,6 +290,16 @@ def test_a_free_space_takes_as_many_control_points_as_it_allows() -> None:
     assert len(fit(space, Candidate({"u": steps})).candidate.signals["u"].times) == 20
 
 
+@pytest.mark.parametrize(
+    ("hold", "told"), [(5.0, ["u is held for 5 s"]), (None, ["u is not held"]), (2.0, [])]
+)
+def test_another_hold_is_said(hold: float | None, told: list[str]) -> None:
+    (u,) = (space := lag_problem(points=3).space).inputs
+    space = replace(space, inputs=(replace(u, hold=hold),))
+    signal = Signal(space.fixed_times(u), (0.0, 1.0, 0.0), u.interpolation, 2.0)
+    assert list(fit(space, Candidate({"u": signal})).notes) == told
+
+
 def test_control_points_of_nanoseconds_are_not_fixed_ones_because_they_are_near_in_seconds() -> None:
     fixed = SearchSpace((InputRange("u", 0.0, 1.0, control_points=3, interpolation="linear"),), (), 1e-8)
     fixed.admit(Candidate({"u": Signal((0.0, 5e-9, 1e-8), (0.0, 1.0, 0.0), "linear")}))

@@ -6,6 +6,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.ranges import Freedom, ParameterRange, Scale
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.simplicity import rest_value, simplicity
+from falsifier.problem.loading import load_problem
 from falsifier.testing import lag_problem
 
 FREE = Freedom(max_control_points=20, min_interval=0.1)
@@ -31,6 +32,13 @@ def test_the_order_of_simplicity() -> None:
     ]
     assert in_order == sorted(in_order)  # type: ignore[type-var]
     assert len(set(map(repr, in_order))) == len(in_order)
+
+
+def test_candidates_that_differ_have_different_keys() -> None:
+    held, line = (Signal((0.0, 5.0), (0.0, 1.0), how) for how in ("constant", "linear"))
+    one, other = (Candidate({"throttle": a, "brake": b}) for a, b in ((held, line), (line, held)))
+    problem = load_problem("AT1")
+    assert simplicity(problem, one) != simplicity(problem, other)
 
 
 @pytest.mark.parametrize(("scale", "nearer"), [("linear", 1e-4), ("log", 5e-3)])

@@ -8,7 +8,7 @@ import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.function_model import FunctionModel
-from falsifier.core.model import Variable
+from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.ranges import InputRange
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
@@ -40,6 +40,13 @@ def test_a_candidate_gets_its_verdict_and_its_trajectory_with_the_inputs() -> No
         for change in (columns.clear, signals.clear, units.clear, values.popitem):
             with pytest.raises(TypeError, match=r"read-only; dict\(...\) makes a copy"):
                 change()
+
+
+def test_a_model_need_not_list_its_variables() -> None:
+    problem = lag_problem()
+    assert isinstance(problem.model, FunctionModel)
+    bare = replace(problem, model=replace(problem.model, info=ModelInfo("bare")))
+    assert evaluate(bare, FULL).robustness == evaluate(problem, FULL).robustness
 
 
 def test_a_parameter_of_the_candidate_goes_before_the_problems() -> None:

@@ -219,6 +219,12 @@ def test_courses_agree_with_the_direct_definition(seed: int) -> None:
         assert course.tolist() == [direct.judge(part, k)[0] for k in range(len(course))], str(part)
 
 
+@pytest.mark.parametrize("part", ["G[0,5] (x <= 1)", "X X X (x <= 1)"])
+def test_a_part_that_needs_more_samples_has_no_course(part: str) -> None:
+    with pytest.raises(FormulaError, match="needs values up to"):
+        Monitor(parse("x <= 1"), 1.0, 3).course(trajectory(x=[0.0, 1.0, 2.0]), parse(part))
+
+
 def test_conditions_disjuncts_and_predicates_are_watched_where_they_count() -> None:
     monitor = Monitor(parse("G[0,2] (x >= 3 -> (y <= 1 or x <= 9))"), step=1.0, samples=4)
     parts = [(str(formula), str(part.formula)) for formula, part in monitor.watched]
@@ -292,6 +298,9 @@ def test_columns_may_be_booleans_integers_or_strided() -> None:
     assert verdict.robustness == ON_LIMIT
     assert verdict.values == {"b": 1.0, "i": 3.0, "x": 5.0}
     assert {type(v) for v in verdict.values.values()} == {float}
+    small = Trajectory(np.arange(2.0), {"n": np.array([3, 2], dtype=np.uint8)})
+    (difference,) = parse("n - 5 <= 0").expressions
+    assert difference.evaluate(small.columns).tolist() == [-2.0, -3.0]
 
 
 # -- monitors as values --------------------------------------------------------------------------------------

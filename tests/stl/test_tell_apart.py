@@ -1,8 +1,10 @@
+from typing import Any
+
 import pytest
 
 from falsifier.stl import Monitor, parse
 from falsifier.stl.intervals import Interval
-from falsifier.stl.tell_apart import tell_apart
+from falsifier.stl.tell_apart import differences, tell_apart
 
 RANGES = {"b": Interval(0, 1), "x": Interval(-10, 10)}
 
@@ -31,6 +33,12 @@ def test_an_example_satisfies_only_one(one: str, other: str) -> None:
 def test_what_one_implies_has_no_example() -> None:
     narrow, wide = parse("G[0,10] (x <= 3)"), parse("G[0,5] (x <= 3)")
     assert tell_apart(narrow, wide, step=0.5, samples=21, ranges=RANGES) is None
+
+
+def test_formulas_of_numbers_alone_differ_in_one_direction() -> None:
+    grid: Any = {"step": 0.5, "samples": 3, "ranges": {}}
+    assert tell_apart(parse("1 <= 2"), parse("2 <= 1"), **grid) is not None
+    assert differences(parse("1 <= 2"), parse("2 <= 1"), **grid) == {1}
 
 
 def test_examples_are_repeatable_and_have_few_steps() -> None:

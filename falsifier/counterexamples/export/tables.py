@@ -32,7 +32,7 @@ class InputTable:
 
 
 def input_table(problem: Problem, candidate: Candidate) -> InputTable:
-    """Make a table of all numeric inputs of the model, including constant ones.
+    """Make a table of all numeric inputs of the model whose values are known, constant ones too.
 
     The rows are the communication points, at which inputs are set; of a solver here, which evaluates them at
     any time, also the times at which their pieces begin. Held and piecewise constant signals step
@@ -64,7 +64,7 @@ def input_table(problem: Problem, candidate: Candidate) -> InputTable:
 
 
 def start_values(problem: Problem, candidate: Candidate) -> dict[str, float | str]:
-    """Parameters, strings and start values that differ from the model's own, by name."""
+    """Parameters, strings and start values that are given, by name; all others are the model's own."""
     inputs = {v.name for v in problem.info.inputs}
     settings: dict[str, float | str] = {**problem.parameters, **candidate.parameters}
     settings |= dict(problem.experiment.strings)
