@@ -1,6 +1,6 @@
 """Can the fixed parameterization violate NNb, NNx and SC at all? The lowest robustness that optimisers reach.
 
-The simulations are divided equally among uniform sampling, three optimisers of all control points at once and
+The simulations are divided equally among uniform sampling, two optimisers of all control points at once and
 an exchange of single ones that starts from random corners. Each ends early if it violates the requirement. A
 requirement that none of them violates may still be violated somewhere: this is evidence, not a proof.
 

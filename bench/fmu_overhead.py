@@ -2,10 +2,10 @@
 
 ``python -m bench.fmu_overhead [--rounds N] [--out bench/fmu_overhead.md]``
 
-Simulates in turn with fmpy.simulate_fmu, FmuModel in this process, FmuModel in its worker, and a C program
-that makes the same calls (bench/fmu_loop.c, needs a C compiler). The FMUs do one Runge-Kutta step of one or
-two states per communication step (tests/fixtures/fmus, Cheap*); if they have an input, it varies over time,
-with 7 control points that are new for each simulation. Then 3000 simulations in a row, a crash, and a hang.
+Simulates in turn with fmpy.simulate_fmu, FmuModel, which has a worker, and a C program that makes the same
+calls (bench/fmu_loop.c, needs a C compiler). The FMUs do one Runge-Kutta step of one or two states per
+communication step (tests/fixtures/fmus, Cheap*); if they have an input, it varies over time, with 7 control
+points that are new for each simulation. Then 3000 simulations in a row, a crash, and a hang.
 """
 
 import argparse

@@ -195,7 +195,7 @@ class Ceiling:
 def ceiling(request: CampaignRequest, price_of: Callable[[LLMSettings], Price | None]) -> Ceiling | None:
     """Estimate what a campaign asks if each simulation takes a question, asked again as often as possible.
 
-    Runs without a limit on simulations are not counted, and calls of tools come on top.
+    Runs without a limit on simulations are not counted.
 
     Returns:
         The estimate; None if the campaign asks no language model.

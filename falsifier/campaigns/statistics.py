@@ -29,7 +29,7 @@ R = TypeVar("R", bound=RunProgress)
 class Statistics:
     """Statistics of several runs.
 
-    All but ``unfinished``, ``best`` and ``budgets`` are of finished runs: they spent the budget or falsified.
+    All but ``unfinished``, ``best`` and ``budgets`` are of finished runs; the tables say which these are.
 
     Attributes:
         runs: number of finished runs.

@@ -26,7 +26,7 @@ class Score:
 
     Attributes:
         falsified: number of falsified runs.
-        runs: number of all runs.
+        runs: number of finished runs.
         mean: mean number of simulations over the falsified runs; None if there is none.
         tool: name of the tool, if the column combines several tools.
     """

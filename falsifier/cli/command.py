@@ -14,7 +14,7 @@ Decorator = Callable[[Function], Function]
 OPTION_GROUPS = {
     "What is searched": (
         *("--stl", "--set", "--search", "--parameterization", "--interface", "--stop-time"),
-        *("--output-interval", "--time-limit", "--allow", "--deny"),
+        *("--output-interval", "--time-limit", "--omit", "--allow", "--deny", "--requirement"),
     ),
     "Search": ("--engine", "--inputs", "--seed", "--runs", "--jobs"),
     "Budget": ("--budget", "--seconds", "--max-tokens", "--max-cost", "--total"),

@@ -27,7 +27,7 @@ DRAWN = b"falsifier"
 def check_out(path: Path, *, begins: bytes = b"", holds: bytes = b"", kept: Path | None = None) -> None:
     """Check that writing a file replaces at most one of its kind: one that begins with and holds these bytes.
 
-    Without them any file is kept, as users change inputs that were written for them.
+    An empty one may be, too. Without bytes any other is kept, as users change inputs written for them.
 
     Raises:
         SpecError: if something else is there, or the file ``kept``, from which is worked.

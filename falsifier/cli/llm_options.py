@@ -77,7 +77,7 @@ def connection_options(command: Function) -> Function:
             "llm_options",
             multiple=True,
             metavar="NAME=VALUE",
-            help="Option of requests to the language model: timeout=SECONDS (default: 600), "
+            help="Option of requests to the language model: timeout=SECONDS (default: 600, of a check 60), "
             "price=SENT:RECEIVED in US dollars per million tokens, cache=no; any other NAME goes to the "
             "provider unchanged, e.g. max_tokens=4000. Repeatable.",
         ),

@@ -146,7 +146,7 @@ def _read(path: Path, name: str, sentry: Sentry | None) -> _File:
 def _fitting(contents: _Contents, room: int) -> list[tuple[int, str]]:
     """Return number and text of each file's fullest form so that each and all together fit.
 
-    The last form of each file is some words long, so that it fits in any case.
+    The last form of each file is some words long, so that each by itself fits in any case.
     """
     forms = [readable.forms for _, readable in contents]
     chosen = [

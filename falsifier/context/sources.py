@@ -52,7 +52,7 @@ def read_source(text: str, shown: str) -> Source | None:
 
 
 def constants_of(source: Source, library: Sequence[Source]) -> dict[str, str]:
-    """Return values of the constants that a file may use; ``5 or 9`` if there are two.
+    """Return values of the constants that a file may use; ``5 or 9`` if there are several.
 
     Other files of the same language may define its constants, or change them.
     """

@@ -47,8 +47,7 @@ class SourceToken(NamedTuple):
 class Threshold:
     """One comparison with a constant.
 
-    It has levels if one variable is compared with nothing but a number or a constant: that number, or two of
-    a constant that has two values.
+    It has levels if one variable is compared with nothing but a number or a constant: that, or its values.
     """
 
     names: frozenset[str]  # variables that are not constants

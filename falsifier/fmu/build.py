@@ -58,7 +58,7 @@ def _compile(path: Path, folder: Path, major: int, identifier: str, target: Path
     missing = [file for file in files if not (root / file).is_file()]
     if missing:
         raise ModelError(f"{path}: the source files {', '.join(missing)} are missing; export it again")
-    macros = [(each.attrib["name"], each.get("value")) for each in stated.get("PreprocessorDefinition", ())]
+    macros = [(each.get("name", ""), each.get("value")) for each in stated.get("PreprocessorDefinition", ())]
     folders = [".", *(each.get("name", ".") for each in stated.get("IncludeDirectory", ()))]
     folders += [str(header.parent.relative_to(root)) for header in sorted(root.rglob("*.h"))]
     # FMI 2 and 3 sources may put a prefix before all function names, which libraries must not have. It has no

@@ -203,7 +203,7 @@ class LiteLLMChat:
         Raises:
             TransientChatError: if a retry may succeed.
             FormatUnsupportedError: if the server rejects this way of asking for JSON.
-            ChatError: for any other failure; it names the LLM and the key's variable.
+            ChatError: for any other failure.
         """
         key = find_key(self.llm, api_base=self.api_base)
         secrets = (key or "", *secrets_in(self.options))

@@ -105,7 +105,7 @@ def _model(info: ModelInfo, experiment: Experiment) -> Iterator[str]:
     shown = [*listed, *others][:_MOST_VARIABLES]
     yield from map(_variable, shown)
     if hidden := len(listed) + len(others) - len(shown):
-        yield f"and {hidden} more internal variables"
+        yield f"and {hidden} more variables"
 
 
 def _variable(v: Variable) -> str:

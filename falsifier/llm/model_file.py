@@ -21,7 +21,7 @@ from falsifier.core.secrets import scrubbed
 from falsifier.errors import ChatSetupError
 
 SUFFIX = ".gguf"
-# Tokens of prompt and reply together: prompts have up to 6,000, and reasoning takes most of the rest.
+# Tokens of prompt and reply together: prompts have up to 16,000, usually 6,000, and reasoning takes the rest.
 CONTEXT = 32_768
 
 _MAGIC = b"GGUF"

@@ -2,13 +2,14 @@ import shlex
 import shutil
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 
 import click
 import pytest
 
 from falsifier.cli import cli
-from falsifier.cli.command import Command
+from falsifier.cli.command import Command, option_groups
 from falsifier.core.files import bundled
 from tests.command import ROOT, commands, falsifier
 
@@ -146,6 +147,13 @@ def test_commands_start_with_few_packages(arguments: str, allowed: set[str] | No
     )
     imported = set(done.stderr.split())
     assert imported <= allowed if allowed else not imported & SLOW
+
+
+def test_what_several_commands_have_is_below_a_heading_of_help() -> None:
+    helps = [option_groups(command, click.Context(command)) for _, command in commands(cli)]
+    names = Counter(row[0].split()[0] for groups in helps for _, rows in groups for row in rows)
+    own = [row[0].split()[0] for first, *more in helps for row in first[1] if more and first[0] == "Options"]
+    assert own and not [name for name in own if names[name] > 1]
 
 
 def test_options_are_few_and_mean_the_same_everywhere() -> None:

@@ -260,6 +260,8 @@ def test_damaged_archives_are_named(tmp_path: Path) -> None:
     path.write_bytes(whole[:200])
     with pytest.raises(ModelError, match="not a readable Simulink file"):
         read_diagram(path)
+    with pytest.raises(ModelError, match=r"gone\.slx: no such file; correct the path"):
+        read_diagram(tmp_path / "gone.slx")
     start = whole.index(b"simulink/systems/system_root.xml") + 32
     path.write_bytes(whole[:start] + bytes(40) + whole[start + 40 :])
     with pytest.raises(FalsifierError, match=r"system_root\.xml is damaged"):

@@ -163,6 +163,15 @@ def test_sources_that_make_no_fmu_are_told_and_nothing_is_written(
     assert list(tmp_path.iterdir()) == [source]
 
 
+@needs_compiler
+def test_a_macro_without_a_name_is_an_error_of_the_fmu(tmp_path: Path) -> None:
+    described = text_of("Lag_3sources", BUILD).replace(
+        'PreprocessorDefinition name="MODEL"', "PreprocessorDefinition"
+    )
+    with pytest.raises(ModelError, match="rearranged"):
+        compile_sources(rearranged(tmp_path, "Lag_3sources", {BUILD: described}), tmp_path / "out.fmu")
+
+
 def test_no_compiler_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "which", lambda _name: None)
     monkeypatch.setattr(importlib.util, "find_spec", lambda _name: None)

@@ -31,7 +31,7 @@ def test_the_question_has_signals_language_templates_and_the_sentence() -> None:
         "from 0 to T = 20 s and sampled every 0.05 s",
         "- level (output, real, in m, at least 0, at most 2.5): Level of the tank",
         "- mode (input, enumeration, at least 0, at most 1, 0 = off, 1 = on)",
-        "and 82 more internal variables",
+        "and 82 more variables",
         "The requirement:\nThe tank never runs dry.",
         "G[a,b] (f)",
         '{"signal": name, "unit": the unit',  # servers that ignore the schema tell no form

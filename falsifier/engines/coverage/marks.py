@@ -131,7 +131,7 @@ def _all_changes(columns: Mapping[str, Floats]) -> Iterator[Change]:
 
 
 def _changes(changes: list[Change]) -> Iterator[tuple[Mark, int]]:
-    """Yield the marks of changes in the order of time: each with its number, and with the ones before it."""
+    """Yield the marks of changes in the order of time: each with its number (3 or 2^n), and those before."""
     counts: dict[tuple[str, float, float], int] = {}
     latest: dict[str, Change] = {}
     for change in changes:

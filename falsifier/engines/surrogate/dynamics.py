@@ -1,4 +1,4 @@
-"""Linear dynamics learnt from whole trajectories, as deviations from the best one, with several lags.
+"""Linear dynamics learnt from whole trajectories, as deviations from one of the best, with several lags.
 
 Deviations cancel initial transients and set points; lags account for hidden states. A roll-out predicts all
 candidates of a population at once: one matrix product per cell. Its errors at similar inputs correct it.

@@ -82,7 +82,7 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         archive = zipfile.ZipFile(path)
     except FileNotFoundError:
-        raise ModelError(f"{path}: no such file; give the path of an .fmu file") from None
+        raise ModelError(f"{path}: no such file; correct the path") from None
     except UNREADABLE as error:
         what = _KINDS.get(path.suffix.lower(), "FMU")
         raise _damaged(f"{path}: not a readable {what}, which is a zip archive", error) from error

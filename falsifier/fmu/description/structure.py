@@ -49,7 +49,7 @@ def read_units(root: Element, *, tag: str = "UnitDefinitions/Unit") -> dict[str,
 def conversion(
     source: str, target: str, known: tuple[Units, Units], *, is_relative: bool = False
 ) -> tuple[float, float] | None:
-    """Return factor and offset that convert a value from one unit to another; None if nobody defines them.
+    """Return factor and offset that convert a value to another unit; None for an unknown or an unlike one.
 
     A unit that is not stated converts to any other unchanged. ``known`` are the units that the FMU of the
     source defines, and that of the target. Offsets do not move differences (``is_relative``).

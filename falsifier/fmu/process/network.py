@@ -68,7 +68,7 @@ class Member:
     name: str  # its name; empty for a single FMU
     path: Path  # path of its FMU
     sha256: str  # hash of the FMU
-    description: Description  # description of the FMU, with the component's name in place of the model's
+    description: Description  # description of the FMU; of a component, with its name in place of the model's
     step: float | None  # step of its own in s; None for the communication step
     interface: Interface  # interface to simulate with
 

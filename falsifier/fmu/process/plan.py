@@ -29,7 +29,7 @@ class Plan:
     times: NDArray[np.float64]  # the output grid in s
     every: int  # communication steps per output interval (co-simulation)
     pieces: int  # maximum number of pieces of an input, see ``Signal.pieces``
-    max_step: float  # maximum step of the solver in s (model exchange)
+    max_step: float  # communication step in s, also the maximum of the solver (model exchange)
     tolerance: float | None  # relative tolerance; None for the model's default
     time_limit: float  # maximum wall-clock time of one simulation in s
     # Whether that is for the whole simulation; else for each tenth of the simulated time, so that slow models

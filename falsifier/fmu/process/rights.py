@@ -65,7 +65,7 @@ class Rights:
             deny: ``network``.
 
         Raises:
-            SpecError: naming what is not one of these.
+            SpecError: naming what is not one of these, or a path that does not exist.
         """
         paths: dict[str, list[Path]] = {kind: [] for kind in _PATHS}
         for word in allow:

@@ -17,10 +17,10 @@ from falsifier.fmu.process.plan import Plan
 from falsifier.fmu.process.worker import GRACE_SECONDS, REUSES, Reuse, Worker
 from falsifier.fmu.process.workplace import Workplace
 
-# Failures of simulations in new processes that are repeated to hear the FMU's messages; more say the same.
+# Failures that are repeated to hear the FMU's messages, beside crashes after a reuse; more say the same.
 _MAX_REPEATS = 3
 # Longest wait for a trial of a way to start, in s and as a multiple of the first simulation's duration: one
-# trial makes an instance and two simulations, on a machine that may be busy.
+# trial makes an instance and up to three simulations, on a machine that may be busy.
 _LEAST_SECONDS, _DURATIONS = 1.0, 20.0
 
 
@@ -31,7 +31,7 @@ class Runner:
         self._workplace, self._order = workplace, order
         # How the next simulation starts, whichever process it runs in; None until that was tested.
         self.reuse: Reuse | None = None
-        self.untrusted: tuple[Reuse, ...] = ()  # ways to start that made the FMU crash or hang
+        self.untrusted: tuple[Reuse, ...] = ()  # ways to start that made the FMU fail, crash or hang
         # The way that is being tested.
         self._trying: Reuse = "reset"
         # How long loading the FMU and its first simulation took at most.
@@ -45,10 +45,10 @@ class Runner:
     def simulate(self, plan: Plan, given: NDArray[np.float64]) -> tuple[NDArray[np.float64], tuple[str, ...]]:
         """Simulate once.
 
-        A simulation that fails in a process that has simulated before is repeated in a new one before it
-        counts as failed: the reuse may be to blame. If it is, the FMU's instances are not reused any more.
-        The repetition asks the FMU for messages, which most FMUs give only on request. ``given`` are the
-        numbers of this simulation; see ``given_values``.
+        A crash in a process that has simulated before is repeated in a new one before it counts: the reuse
+        may be to blame. If it is, the FMU's instances are not reused in this way any more. The repetition
+        asks the FMU for messages, which most FMUs give only on request; for these, the first few other
+        failures are repeated, too. ``given`` are the numbers of this simulation; see ``given_values``.
 
         Returns:
             The outputs, shape (outputs, samples), and the FMU's messages.

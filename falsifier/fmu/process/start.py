@@ -120,7 +120,7 @@ class Started:
     """A worker's process with what belongs to it, for FMUs that were unpacked to a folder.
 
     Raises:
-        ModelError: if there is no program for this machine.
+        ModelError: if there is no program for this machine, or it cannot be started.
     """
 
     def __init__(self, workplace: Workplace, folder: Path, rights: Rights, *, through_wine: bool) -> None:
@@ -206,7 +206,7 @@ def _with_libraries(environment: dict[str, str], program: Path, folder: Path, li
 
 @cache
 def _libraries(folder: Path) -> tuple[Path, ...]:
-    """Return the libraries of FMUs that need more than one, as they were before any of the FMUs ran.
+    """Return the libraries of FMUs, if any has more than one, as they were before any of the FMUs ran.
 
     Not those of which two FMUs have different ones, and no part of the C library.
     """

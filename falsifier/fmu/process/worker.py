@@ -126,6 +126,7 @@ class Worker(Started):
         """Connect and load the library; the limit is in s.
 
         Raises:
+            ModelError: if the program does not start.
             ConnectionError: if the process ends.
             TimeoutError: if it takes longer.
         """

@@ -23,7 +23,7 @@ class System(Isolated):
     """Several connected FMUs, simulated together; their variables are ``component.variable``.
 
     Attributes:
-        components: the FMUs by name: a path, or a Component if it has a step of its own.
+        components: the FMUs by name: a path, or a Component if its step or its interface is stated.
         connections: by input, where its values come from: the name of an output, or a Connection.
         coupling: how the components exchange values.
         frame: inputs, names, values and stop time that the system has as a whole.
@@ -32,7 +32,7 @@ class System(Isolated):
         logging: whether to ask the FMUs for messages in every simulation; otherwise only after a failure.
         allow: what the FMUs may do; see FmuModel.
         deny: what they may not do.
-        key: hash of everything that determines the trajectories: FMUs, steps, connections, coupling, frame.
+        key: hash of everything that determines the trajectories, such as FMUs and connections, and the name.
 
     Raises:
         ModelError: if a file is not an FMU.
@@ -109,7 +109,7 @@ class System(Isolated):
 
         Raises:
             SimulationError: if there is no complete trajectory; names the component that failed.
-            SpecError: if a component's own step is not an integer multiple of the communication step.
+            SpecError: if a component's own step is no multiple of the communication step, or too long.
         """
         values = dict(self.frame.values)
         texts = tuple((n, v) for n, v in values.items() if isinstance(v, str))

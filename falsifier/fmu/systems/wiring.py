@@ -88,14 +88,14 @@ def _member(name: str, component: Component) -> Member:
             "first values; export it as FMI 2 or 3",
             key=key,
         )
-    if description.needs_wine("co-simulation"):
+    interface = component.interface or description.info.default_interface
+    if description.needs_wine(interface):
         raise SpecError(
             f"{path}: its only library is for Windows; such an FMU runs through Wine, but not as a component "
             "of a system; export it for this platform too",
             key=key,
         )
     named = replace(description, info=replace(description.info, name=name))
-    interface = component.interface or named.info.default_interface
     return Member(name, path, component.sha256, named, component.step, interface)
 
 

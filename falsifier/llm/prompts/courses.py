@@ -55,7 +55,7 @@ def change_list(times: Array, column: Array, *, clock: int, label: Label = lambd
     if not rest:
         return f"constant {begin}"
     changes = [f"{label(v, plain(v, 6))} from {plain(start, clock)} s" for v, start, _ in rest]
-    if len(changes) >= SHOWN_CHANGES:
+    if len(changes) > SHOWN_CHANGES:
         half = SHOWN_CHANGES // 2
         left_out = f"{len(changes) + 1 - 2 * half} more changes"
         changes = [*changes[: half - 1], left_out, *changes[-half:]]

@@ -47,7 +47,7 @@ _SIDES: Mapping[type[Formula], str] = {
     Iff: "sides",
 }
 _MARGIN = re.compile(r" by [^ ]+$")
-# Maximum number of signals shown over time; those of the formula come first.
+# Maximum number of signals that are not discrete over time; all that are compared come first.
 _MAX_SIGNALS = 16
 
 
@@ -182,7 +182,7 @@ def _predicates(
         for name in view.recorded
         if name in trajectory.columns
         and view.is_discrete(name, trajectory[name])
-        and np.count_nonzero(np.diff(trajectory[name])) < courses.SHOWN_CHANGES
+        and np.count_nonzero(np.diff(trajectory[name])) <= courses.SHOWN_CHANGES
     }
     for predicate in view.requirement.formula.predicates:
         if len(predicate.signals) == 1 and listed.issuperset(predicate.signals):
@@ -221,14 +221,13 @@ def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
 
 
 def _shown_columns(view: View, trajectory: Trajectory, compared: dict[str, Array]) -> dict[str, Array]:
-    """What is compared, then the recorded signals; of a problem without input signals, only integers.
+    """What is compared, then recorded signals that are not discrete; none if there are no input signals.
 
-    Its parameters act at the start alone, so that the course of everything else decides nothing.
+    Parameters act at the start alone, so that the course of everything else decides nothing.
     """
-    others = [n for n in view.recorded if n in trajectory.columns and n not in compared]
-    if not view.space.inputs:
-        others = [n for n in others if view.is_discrete(n, trajectory[n])]
-    columns = compared | {n: trajectory[n] for n in others[: max(0, _MAX_SIGNALS - len(compared))]}
+    found = {n: trajectory[n] for n in view.recorded if view.space.inputs and n in trajectory.columns}
+    others = [n for n, c in found.items() if n not in compared and not view.is_discrete(n, c)]
+    columns = compared | {n: found[n] for n in others[: max(0, _MAX_SIGNALS - len(compared))]}
     return {text: column for text, column in columns.items() if np.isfinite(column).all()}
 
 

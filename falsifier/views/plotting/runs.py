@@ -91,7 +91,7 @@ def falsification_curve(runs: Iterable[Run]) -> Curve:
     """Share of finished runs that are falsified, over the number of simulations.
 
     Returns:
-        Numbers of simulations, from 0 to the maximum of all runs, and the share at each, both of shape (k,);
+        Numbers of simulations, from 0 to the most of these runs, and the share at each, both of shape (k,);
         the share is constant between two numbers.
     """
     finished = [run for run in runs if run.counts]

@@ -183,7 +183,7 @@ def shown_of(run: Run, candidate: Candidate) -> Shown:
 
 
 def _shrunk(run: Run) -> Shown | None:
-    """Return a run's shrunk counterexample, which ``falsifier explain`` leaves in the run directory.
+    """Return a run's shrunk counterexample, which ``falsifier explain --shrink`` leaves in its directory.
 
     None if there is none, or if its formula, FMU or spec is no longer that of the run.
     """

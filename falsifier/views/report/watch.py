@@ -226,7 +226,7 @@ async def serve(directory: Path, *, announce: Callable[[str], None], allow_stop:
     The address, which has a free port, is announced. With allow_stop, the page has a button.
 
     Raises:
-        JournalError: if the directory is none of these, or a file in it is invalid.
+        JournalError: if the directory is no run, campaign or folder of runs, or a file in it is invalid.
     """
     from aiohttp import web
 

@@ -100,12 +100,13 @@ def test_an_output_may_feed_several_inputs_and_arrays_go_element_by_element() ->
     assert found.info.connections == (("a.y[1]", "b.u[1]"), ("a.y[2]", "b.u[2]"), ("a.y[2]", "c.u"))
 
 
-def test_components_with_a_windows_library_only_are_refused() -> None:
-    path = fixtures.FOLDER / "win64" / "Lag_2.fmu"
+@pytest.mark.parametrize("name", ["Lag_2", "Stiff_2"], ids=["co-simulation", "model exchange"])
+def test_components_with_a_windows_library_only_are_refused(name: str) -> None:
+    path = fixtures.FOLDER / "win64" / f"{name}.fmu"
     if not libraries.can_run_windows():
         pytest.skip("on this machine it is refused as an FMU without a library")
     with pytest.raises(SpecError, match=r"its only library is for Windows; .* not as a component"):
-        System({"lag": path}, {})
+        System({"a": path}, {})
 
 
 def order(model: System) -> list[str]:

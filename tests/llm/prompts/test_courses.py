@@ -29,6 +29,9 @@ def test_change_list() -> None:
     told = "1, then 2 from 1.6 s, 3 from 4.36 s, 2 from 5 s, 1 from 5.25 s, 4 from 7 s"
     assert change_list(TIMES, GEAR, clock=2) == told
     assert change_list(TIMES, np.full_like(TIMES, 3.0), clock=2) == "constant 3"
+    for count, left_out in ((16, []), (17, ["2 more changes"])):
+        changes = change_list(TIMES, np.minimum(np.arange(1001) // 10, count) * 1.0, clock=2).split(", ")
+        assert [each for each in changes if "more" in each] == left_out
     long = change_list(TIMES, (np.arange(1001) // 10 % 2).astype(np.float64), clock=2)
     assert long.startswith("0, then 1 from 0.1 s") and "85 more changes" in long and long.endswith("10 s")
 

@@ -114,6 +114,16 @@ def test_courses_are_breakpoints_and_more_exact_ones_where_it_was_decided() -> N
     assert short.startswith("x: 0:0 ") and len(short) <= len(over_time)
 
 
+def test_however_many_signals_are_discrete_others_are_told_over_time() -> None:
+    view, evaluation = seen("G[0,10] (x <= 2)", np.sin(TIMES / 2))
+    assert evaluation.trajectory is not None
+    columns = {**{f"b{k}": np.where(k / 4 < TIMES, 1.0, 0.0) for k in range(20)}, "z": TIMES.copy()}
+    view = replace(view, experiment=replace(view.experiment, outputs=("x", *columns)))
+    trajectory = Trajectory(TIMES, {**evaluation.trajectory.columns, **columns})
+    lines = facts(view, replace(evaluation, trajectory=trajectory))
+    assert line(lines, "b19: ") == "b19: 0, then 1 from 4.8 s" and line(lines, "z: ") == "z: 0:0 10:10"
+
+
 def test_a_ripple_beside_the_threshold_is_told_although_it_is_small() -> None:
     jump = np.where(TIMES < 1, 5.0 * (1 - TIMES), 0.0) + 0.034 * (TIMES > 6) * np.sin(TIMES * np.pi)
     over_time, _ = courses(*seen("G[2,10] (x <= 0.035)", jump))
