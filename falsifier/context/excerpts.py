@@ -57,7 +57,7 @@ def of_source(
 
     A source that the user did not name is told only if it sets one of the requirement's signals, ``seeds``.
     """
-    short = ("size only", counted(source.text.count("\n") + 1, "line"))
+    short = ("size only", counted(len(source.text.splitlines()), "line"))
     variables = {each.name for each in source.assigned if not each.is_constant}
     if not is_named and variables.isdisjoint(name.rpartition(".")[2] for name in seeds):
         return Readable((short,))
@@ -74,7 +74,7 @@ def of_source(
         ("lines with the requirement's signals", "\n".join(_naming(source.text, "\n", seeds))),
         short,
     )
-    return Readable(forms, limits)
+    return Readable(tuple(form for form in forms if form[1]), limits)
 
 
 def of_text(text: str, shown: str, signals: Collection[str]) -> Readable:

@@ -73,7 +73,7 @@ def _may_tell(name: PurePosixPath) -> bool:
 def text_of(content: bytes) -> str | None:
     """Return the text of a file by the mark it begins with, else UTF-8, Windows-1252 or Latin-1.
 
-    None for binary data, and for PDF and RTF.
+    Lines end as on this machine, whichever machine wrote them. None for binary data, and for PDF and RTF.
 
     >>> text_of("5 K".encode("utf-16")), text_of(bytes([53, 176])), text_of(bytes(4))
     ('5 K', '5°', None)
@@ -88,7 +88,7 @@ def text_of(content: bytes) -> str | None:
         text = _decoded(content, "cp1252") or content.decode("latin-1")
         if _CONTROL.search(text):
             return None
-    return None if text is None or "\0" in text else text
+    return None if text is None or "\0" in text else text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _decoded(content: bytes, encoding: str) -> str | None:

@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import accumulate
+from os.path import realpath
 from pathlib import Path
 from types import MappingProxyType
 
@@ -67,9 +68,9 @@ def gather(
         ModelError: if an archive is damaged or dangerous.
     """
     sentry = Sentry(checked) if is_told else None
-    once: dict[Path, str] = {}
+    once: dict[str, str] = {}
     for name in files:  # a spec and an option may name one file in different ways
-        once.setdefault(Path(name).resolve(), name)
+        once.setdefault(realpath(name), name)
     found = [_read(Path(name), name, sentry) for name in once.values()]
     notes = []
     for fmu in fmus:
@@ -98,9 +99,7 @@ def gather(
     crossings = tuple(each for name, ends in ranges.items() for each in _crossings(found_in, name, *ends))
     if sentry is None:
         return Context(crossings=crossings)
-    told = _compared(contents, signals)
-    sizes = accumulate(len(each.text) for each in told)
-    compared = tuple(each for each, size in zip(told, sizes, strict=True) if size <= _MAX_COMPARED)
+    compared = _compared(contents, signals)
     chosen = _fitting(contents, MAX_TOTAL - sum(len(each.text) for each in compared))
     excerpts = []
     for (file, readable), (i, text) in zip(contents, chosen, strict=True):
@@ -112,7 +111,7 @@ def gather(
         form = f"{readable.forms[i][0]}{', because the rest is too long' if i else ''}"
         excerpts.append(Excerpt(file.path, file.name, file.sha256, form, text))
     sentry.refuse_unused()
-    return Context(tuple(excerpts), compared, crossings, (*notes, *sentry.notes))
+    return Context(tuple(excerpts), tuple(compared), crossings, (*notes, *sentry.notes))
 
 
 def _read(path: Path, name: str, sentry: Sentry | None) -> _File:
@@ -183,7 +182,7 @@ def _crossings(found: Iterable[Threshold], name: str, low: float, high: float) -
 
 
 def _compared(contents: _Contents, signals: Collection[str]) -> list[Compared]:
-    """Return what is said of signals of the model, then other thresholds."""
+    """Return what is said of signals of the model, then other thresholds, and how many do not fit."""
     ends: dict[str, list[str]] = {}  # components of a system may have signals of the same name
     for name in signals:
         words = name.split(".")
@@ -196,4 +195,7 @@ def _compared(contents: _Contents, signals: Collection[str]) -> list[Compared]:
         if names or threshold.place:  # a mode that sets no signal says nothing
             limits.append(Compared(names, threshold.text))
     limits.sort(key=lambda each: not each.signals)
-    return limits[:_MAX_COMPARISONS]
+    sizes = accumulate(len(each.text) for each in limits[:_MAX_COMPARISONS])
+    fitting = sum(size <= _MAX_COMPARED for size in sizes)
+    left_out = len(limits) - fitting
+    return [*limits[:fitting], *([Compared((), f"... ({left_out} more)")] if left_out else [])]

@@ -16,7 +16,7 @@ from falsifier.context.thresholds import CLOSING, OPENING, SourceToken, statemen
 _DEFINE = re.compile(r"\s*#\s*define\s+(\w+)[ \t]+(.*)", re.DOTALL)
 _COMMENT = re.compile(r"//[^\n]*+|/\*.*?(?:\*/|\Z)", re.DOTALL)
 _C, _MODELICA = (".c", ".h", ".cpp", ".hpp"), (".mo",)
-_UNCHANGING = frozenset(("parameter", "constant", "const"))
+_UNCHANGING = frozenset(("parameter", "constant", "const", "constexpr"))
 _MAX_CHARACTERS = 4_000_000  # far more than a model of 10,000 lines has
 _MAX_VALUE = 400  # characters of a value
 

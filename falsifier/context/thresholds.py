@@ -15,6 +15,8 @@ _BOUNDARIES = frozenset(_BOUNDING.split())
 _DECIMAL = r"(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
 _HEXADECIMAL = r"0[xX][0-9a-fA-F]++(?:\.?[0-9a-fA-F]*+[pP][-+]?\d++)?"
 _NUMBER = re.compile(rf"([-+]?)(?:({_HEXADECIMAL})|({_DECIMAL}))[fFlLuU]*$")
+# What the value of a constant begins with: (float)7.2, and whether it states a number at all.
+_CAST, _STATED = re.compile(r"\(\s*[^\W\d]\w*\s*\)\s*(?=[\d.])"), re.compile(r"(?<!\w)\d")
 _MAX_LENGTH = 160
 OPENING, CLOSING = frozenset("([{"), frozenset(")]}")
 # Every alternative either takes what it has looked at or gives up after a limited number of characters, so
@@ -22,6 +24,7 @@ OPENING, CLOSING = frozenset("([{"), frozenset(")]}")
 _TOKEN = re.compile(
     r"""
     (?P<blank>\s++)
+  | (?P<cast>(?<!\w)\(\s*+[^\W\d]\w*+\s*+\)\s*+(?=[\w.]))  # of C: (float)u
   | (?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))
   | (?P<directive>^[ \t]*+\#(?:[^\n\\]|\\.)*+)
   | (?P<number>0[xX][0-9a-fA-F]++\.?[0-9a-fA-F]*+(?:[pP][+-]?\d++)?[a-zA-Z]*+
@@ -118,7 +121,8 @@ def _threshold(
     named = {paths[path]: value for path, value in known.items() if len(value) <= _MAX_LENGTH}
     stated_values = [value for stated in named.values() for value in stated.split(" or ")]
     variables = frozenset(paths.keys() - known.keys())
-    if not variables or not [*_numbers([*(t.text for t in tokens if t.kind == "number"), *stated_values])]:
+    has_number = any(t.kind == "number" for t in tokens) or any(map(_STATED.search, stated_values))
+    if not variables or not has_number:
         return None
     levels: tuple[float, ...] = ()
     for side, other in (sides, sides[::-1]):
@@ -132,7 +136,7 @@ def _threshold(
 def _numbers(texts: Iterable[str]) -> Iterator[float]:
     """Return those of some texts that are nothing but a number, and none that is too large for one."""
     for text in texts:
-        if found := _NUMBER.match(text.strip().strip("()")):
+        if found := _NUMBER.match(_CAST.sub("", text).strip().strip("()")):
             sign, hexadecimal, decimal = found.groups()
             with suppress(OverflowError):
                 number = float(decimal) if decimal else float.fromhex(hexadecimal)
@@ -160,9 +164,9 @@ def _variables(tokens: Sequence[SourceToken], *, is_dotted: bool) -> Iterator[tu
 
 
 def tokens_of(text: str) -> Iterator[SourceToken]:
-    """Return the tokens of a text in any of the languages, without blanks and comments."""
+    """Return the tokens of a text in any of the languages, without blanks, comments and casts."""
     for found in _TOKEN.finditer(text):
-        if found.lastgroup not in ("blank", "comment"):
+        if found.lastgroup not in ("blank", "comment", "cast"):
             yield SourceToken(found.lastgroup or "", found[0], found.start(), found.end())
 
 

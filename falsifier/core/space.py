@@ -173,21 +173,24 @@ class SearchSpace:
         """Check that a candidate has a value for all that is searched, and none outside its range.
 
         Raises:
-            CandidateError: naming the input or parameter that is unknown, or all missing or out of range.
+            CandidateError: naming an input or parameter that is unknown, and all missing or out of range.
         """
-        for name in (*candidate.signals, *candidate.parameters):
-            if name not in self.names:
-                raise CandidateError(f"unknown input or parameter {name!r}; {did_you_mean(name, self.names)}")
+        unknown = [name for name in (*candidate.signals, *candidate.parameters) if name not in self.names][:1]
+        wrong = [f"unknown input or parameter {n!r}; {did_you_mean(n, self.names)}" for n in unknown]
         missing: list[Range] = [r for r in self.inputs if r.name not in candidate.signals]
         missing += [p for p in self.parameters if p.name not in candidate.parameters]
-        if missing:
-            raise CandidateError("; ".join(f"{r.label} is missing" for r in missing))
-        outside = [_signal_outside(r, candidate.signals[r.name]) for r in self.inputs]
+        wrong += [f"{r.label} is missing" for r in missing]
+        if wrong := [*wrong, *self.outside(candidate)]:
+            raise CandidateError("; ".join(wrong))
+
+    def outside(self, candidate: Candidate) -> list[str]:
+        """Say what is outside its range, of the inputs and parameters that the candidate has."""
+        signals, values = candidate.signals, candidate.parameters
+        found = [_signal_outside(r, signals[r.name]) for r in self.inputs if r.name in signals]
         for p in self.parameters:
-            if is_outside(p, value := candidate.parameters[p.name]):
-                outside.append(f"{p.label}: {value:.12g} is {outside_text(p)}")
-        if any(outside):
-            raise CandidateError("; ".join(filter(None, outside)))
+            if p.name in values and is_outside(p, value := values[p.name]):
+                found.append(f"{p.label}: {value:.12g} is {outside_text(p)}")
+        return [each for each in found if each]
 
     def admit(self, candidate: Candidate) -> Candidate:
         """Return the candidate as it will be simulated.

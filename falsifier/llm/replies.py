@@ -115,10 +115,12 @@ class ReplyForm:
                 if p.name in parameters:
                     raise RejectedReplyError(f"parameter {quoted(p.name)} is given twice")
                 parameters[p.name] = _possible(p.value, ranges[p.name]) if p.name in ranges else p.value
+        candidate = Candidate(signals, parameters, origin, written.rationale)
         if defects:
+            defects += self.space.outside(candidate)
             raise RejectedReplyError(first_few(defects, _MOST_DEFECTS, between="; "))
         try:
-            return self.space.admit(Candidate(signals, parameters, origin, written.rationale))
+            return self.space.admit(candidate)
         except CandidateError as error:
             raise RejectedReplyError(str(error)) from None
 

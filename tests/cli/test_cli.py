@@ -85,6 +85,11 @@ def test_wrong_usage_ends_with_two_and_says_what_to_do(
     assert "Traceback" not in done.err and done.out == ""
 
 
+def test_a_report_on_a_link_to_itself_says_that_nothing_is_there(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to("loop")
+    assert "loop: no such directory" in falsifier("report", "loop", cwd=tmp_path, code=2).err
+
+
 @pytest.mark.parametrize("command", [["run", "AT1"], ["run", "AT"], ["bench", "AT1"], ["simulate", "AT1"]])
 def test_a_folder_with_files_is_kept(command: list[str], tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()

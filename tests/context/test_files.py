@@ -41,6 +41,11 @@ def test_text_is_read_in_the_encodings_that_tools_write(encoding: str) -> None:
     assert text_of("limit = 64 °C".encode(encoding)) == "limit = 64 °C"
 
 
+@pytest.mark.parametrize("end", ["\r\n", "\r"])
+def test_lines_end_as_here_whichever_machine_wrote_them(end: str) -> None:
+    assert text_of(f"#define LIMIT \\{end} 3{end}".encode()) == "#define LIMIT \\\n 3\n"
+
+
 @pytest.mark.parametrize("mark", [b"\xfe\xff", b"\x00\x00\xfe\xff"])
 def test_marks_of_big_endian_text(mark: bytes) -> None:
     assert text_of(mark + "5 K".encode("utf-16-be" if len(mark) == 2 else "utf-32-be")) == "5 K"

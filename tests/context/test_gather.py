@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from falsifier.context.gather import MAX_TOTAL, gather
-from falsifier.context.values import Context
+from falsifier.context.values import Compared, Context
 from falsifier.core.files import bundled
 from falsifier.errors import SpecError
 from tests.fixtures import simulink
@@ -62,6 +62,12 @@ def test_of_a_long_table_the_lines_that_name_a_signal_are_told(tmp_path: Path) -
     assert excerpt.text == "power;0.8"
 
 
+def test_comparisons_that_do_not_fit_are_counted(tmp_path: Path) -> None:
+    path = tmp_path / "a.c"
+    path.write_text("".join(f"if (power > {i}) return;\n" for i in range(100)))
+    assert read(path).comparisons[-1] == Compared((), "... (40 more)")
+
+
 def test_all_files_together_fit(tmp_path: Path) -> None:
     paths = [tmp_path / f"{i}.md" for i in range(4)]
     for path in paths:
@@ -107,8 +113,10 @@ def test_escapes_of_json_hide_no_secret(tmp_path: Path, text: str) -> None:
 
 
 def test_missing_and_binary_files_are_named(tmp_path: Path) -> None:
-    with pytest.raises(SpecError, match=r"none\.md: cannot be read"):
-        read(tmp_path / "none.md")
+    (tmp_path / "loop.md").symlink_to("loop.md")
+    for name in ("none", "loop"):
+        with pytest.raises(SpecError, match=rf"{name}\.md: cannot be read"):
+            read(tmp_path / f"{name}.md")
     (tmp_path / "a.bin").write_bytes(b"\0\1\2")
     with pytest.raises(SpecError, match=r"a\.bin: expected text or a Simulink file"):
         read(tmp_path / "a.bin")
@@ -168,7 +176,7 @@ def test_comparisons_count_among_the_characters(tmp_path: Path) -> None:
     path.write_text(f"{text}}}\n")
     (tmp_path / "b.md").write_text("The power matters. " * 600)
     context = read(path, tmp_path / "b.md")
-    size = sum(len(c.text) for c in context.comparisons)
+    size = sum(len(c.text) for c in context.comparisons[:-1])
     assert 5_000 < size <= 6_000
     assert size + sum(len(e.text) + len(e.name) + len(e.form) for e in context.excerpts) <= MAX_TOTAL
 

@@ -61,6 +61,8 @@ def test_what_has_no_constant_or_no_variable_is_not_told() -> None:
     assert compared("1 < 2") == []
     assert compared("a > b", b="c + d") == []
     assert compared("> 3") == []
+    assert compared("(u) > 3 and abs(v) > 2 and f(x) and w > 1") == ["(u) > 3", "abs(v) > 2", "w > 1"]
+    assert compared("a > b and c > d", b="SCALE(7)", d="x1") == ["a > b (b = SCALE(7))"]
 
 
 def test_names_values_and_place() -> None:
@@ -84,6 +86,9 @@ def test_kinds_of_tokens_of_all_languages() -> None:
     ]  # fmt: skip
 
 
+CONSTANTS = {"limit": "5 or 9 or something", "cast": "((real_T)7.2F)"}
+
+
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
@@ -95,6 +100,8 @@ def test_kinds_of_tokens_of_all_languages() -> None:
         ("limit <= u", (5.0, 9.0)),
         ("(u > 3", (3.0,)),
         ("u > (3)", (3.0,)),
+        ("(float)u > (uint8_T) 3U", (3.0,)),
+        ("u > cast", (7.2,)),
         ("f(x[i > 3]) > u + 1", (3.0,)),
         ("u > 0x" + 300 * "F", ()),
         ("u > 1e999", ()),
@@ -107,7 +114,7 @@ def test_kinds_of_tokens_of_all_languages() -> None:
 def test_levels_are_those_of_a_variable_that_is_compared_with_a_number(
     text: str, expected: tuple[float, ...]
 ) -> None:
-    assert [t.levels for t in thresholds(text, {"limit": "5 or 9 or something"}, "a.mo") if t.levels] == (
+    assert [t.levels for t in thresholds(text, CONSTANTS, "a.mo") if t.levels] == (
         [expected] if expected else []
     )
 
@@ -153,7 +160,6 @@ def test_conditions_of_modelica_whatever_class_they_belong_to() -> None:
         ("model M Real y; equation " + "if a then " * 300 + "y = 1;", "a.mo"),
         ("model M Real y; end if; Gain; end M; }{ connect(", "a.mo"),
         ("model M Real y annotation(", "a.mo"),
-        ("", "a.mo"),
     ],
 )
 def test_what_is_not_closed_or_nested_deep_is_told_all_the_same(text: str, shown: str) -> None:
@@ -165,6 +171,7 @@ def test_constants_are_resolved() -> None:
     assert found(text, "a.c") == ["m->u > L (L = 5 or 9)"]
     text = "const double L = 0.5; void f(M *m) { m->y = m->u > L; }"
     assert found(text, "a.c") == ["m->u > L (L = 0.5)"]
+    assert found(text.replace("const", "constexpr"), "a.cpp") == ["m->u > L (L = 0.5)"]
     assert found(f"{text} void g(M *m) {{ int L = m->v; }}", "a.c") == [], "a variable elsewhere"
 
 
@@ -190,6 +197,10 @@ def test_sources_have_shorter_and_shorter_forms() -> None:
         "size only": "7 lines",
     }
     assert [t.text for t in readable.found] == ["u > p (p = 3)"]
+
+
+def test_a_source_without_text_is_not_too_long() -> None:
+    assert texts(read("", "a.c")) == {"size only": "0 lines"}
 
 
 def test_a_source_inside_an_fmu_is_told_only_if_it_sets_a_signal() -> None:

@@ -55,6 +55,15 @@ def test_numbers_in_order() -> None:
     assert read({"point": [100, 50, 0, 0, 325, 1000], "rationale": ""}).key == read(GOOD).key
 
 
+def test_ranges_are_told_together_with_what_is_malformed_unknown_or_missing() -> None:
+    uneven = {"name": "throttle", "times": [0, 5], "values": [1, 2, 3]}
+    too_high = {"name": "brake", "values": [0, 400]}
+    with pytest.raises(RejectedReplyError, match=r"2 times and 3 values.*'brake' at .*400 is outside"):
+        read({"rationale": "", "signals": [uneven, too_high], "parameters": []})
+    with pytest.raises(RejectedReplyError, match=r"'mas'.*'throttle' is m.*'mass' is m.*400 is out"):
+        read({"rationale": "", "signals": [too_high], "parameters": [{"name": "mas", "value": 1}]})
+
+
 def changed(**changes: Any) -> dict[str, Any]:
     return {**GOOD, **changes}
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import isclose
+from os.path import realpath
 from pathlib import Path
 from typing import Literal
 
@@ -107,7 +108,7 @@ class Side:
 
 def gather(*directories: Path) -> list[Side]:
     """Read runs or campaigns; several are compared; JournalError if a directory is neither, or is damaged."""
-    names = [directory.resolve().name for directory in directories]
+    names = [Path(realpath(directory)).name for directory in directories]
     return [
         _side(directory, str(directory) if names.count(name) > 1 else name)
         for directory, name in zip(directories, names, strict=True)

@@ -26,6 +26,7 @@ from falsifier.campaigns.runs import RunProgress, unread_runs
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import write_whole
 from falsifier.core.words import counted
+from falsifier.errors import FalsifierError
 from falsifier.llm.messages import Exchange
 from falsifier.record.journal import STOP
 from falsifier.record.records import AskedRecord, ExchangeRecord
@@ -198,7 +199,10 @@ def application(watch: Watch) -> "Application":
 
     async def page(request: "Request") -> "Response":
         async with lock:  # figures are drawn one at a time, beside the loop that answers
-            text, again = await asyncio.to_thread(watch.look, request.query.get("run", ""))
+            try:
+                text, again = await asyncio.to_thread(watch.look, request.query.get("run", ""))
+            except FalsifierError as error:  # what is on disk may be damaged, or taken away meanwhile
+                text, again = el("p", str(error), class_="result"), None
         headers = {"Cache-Control": "no-store"}
         if again is not None and "still" not in request.query:
             headers["Refresh"] = str(again)

@@ -14,6 +14,7 @@ import pytest
 from falsifier.campaigns import Progress, run_campaign
 from falsifier.errors import JournalError
 from falsifier.llm.scripted import ScriptedChat
+from falsifier.record.journal import JOURNAL
 from falsifier.record.run import falsify, resume
 from falsifier.search.events import Evaluated, Event
 from falsifier.testing import lag_problem
@@ -137,6 +138,15 @@ def test_the_page_is_served_to_this_machine_and_loaded_again_only_while_more_com
         assert first.headers["Refresh"] is None
         assert asked(port, "/", Host="evil.example").status == 403
         assert asked(port, "/stop", "POST").status == 403
+
+
+def test_the_page_of_a_damaged_run_says_what_to_do(tmp_path: Path) -> None:
+    falsify(hard(), "uniform", budget=1, directory=tmp_path)
+    with (tmp_path / JOURNAL).open("a") as journal:
+        journal.write("<b>no record</b>\n")
+    with served(tmp_path) as port:
+        answer = asked(port, "/")
+        assert (answer.status, "falsifier tools repair" in answer.read().decode()) == (200, True)
 
 
 def test_a_stop_needs_the_pages_token_and_ends_a_run_that_can_be_resumed(tmp_path: Path) -> None:
