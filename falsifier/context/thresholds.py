@@ -24,7 +24,8 @@ OPENING, CLOSING = frozenset("([{"), frozenset(")]}")
 _TOKEN = re.compile(
     r"""
     (?P<blank>\s++)
-  | (?P<cast>(?<!\w)\(\s*+[^\W\d]\w*+\s*+\)\s*+(?=[\w.]))  # of C: (float)u
+  # A cast of C, such as (float)u; before a blank and a name, it may be a condition.
+  | (?P<cast>(?<!\w)\(\s*+[^\W\d]\w*+\s*+\)(?:(?=[\w.])|\s++(?=[\d.])))
   | (?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))
   | (?P<directive>^[ \t]*+\#(?:[^\n\\]|\\.)*+)
   | (?P<number>0[xX][0-9a-fA-F]++\.?[0-9a-fA-F]*+(?:[pP][+-]?\d++)?[a-zA-Z]*+

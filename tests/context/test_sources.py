@@ -84,6 +84,7 @@ def test_kinds_of_tokens_of_all_languages() -> None:
         ("number", "1.5e-3f"), ("sign", ";"),
         ("name", "'a b'"), ("text", '"t\\""'), ("sign", ":=")
     ]  # fmt: skip
+    assert " ".join(t.text for t in tokens_of("if (on) (T)u >= (T) 3")) == "if ( on ) u >= 3"
 
 
 CONSTANTS = {"limit": "5 or 9 or something", "cast": "((real_T)7.2F)"}
