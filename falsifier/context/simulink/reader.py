@@ -105,7 +105,8 @@ class _Systems:
             if end.block not in known:
                 where = path or "the model"
                 raise SpecError(
-                    f"{self.shown}: a line of {where} ends at {end.block!r}, which is no block there"
+                    f"{self.shown}: a line of {where} ends at {shortened(end.block, 60)!r}, which is no "
+                    "block there; save the model again"
                 )
         return BlockSystem(blocks, wires)
 
@@ -115,7 +116,8 @@ class _Systems:
         if not kind or not node.get("Name"):
             missing = "type" if not kind else "name"
             raise SpecError(
-                f"{self.shown}: a block of {path or 'the model'} has no {missing} ({name or kind})"
+                f"{self.shown}: a block of {path or 'the model'} has no {missing} ({name or kind}); "
+                "save it again"
             )
         instance = node.first("InstanceData")
         stated = {**node.values, **(instance.values if instance else {})}
