@@ -340,7 +340,11 @@ requirement_option = click.option(
 
 
 def out_option(text: str, *, metavar: str = "FILE") -> Decorator:
-    return click.option("-o", "--out", type=PATH, metavar=metavar, help=text)
+    def follow(_context: click.Context, _option: click.Parameter, path: Path | None) -> Path | None:
+        """Return the file that a link leads to: the link is followed, not replaced."""
+        return path.resolve() if path and path.is_symlink() and not path.is_dir() else path
+
+    return click.option("-o", "--out", type=PATH, metavar=metavar, help=text, callback=follow)
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")
