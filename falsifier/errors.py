@@ -65,7 +65,7 @@ class FalsifierError(Exception):
     exit_code = 2
 
     def __init__(self, message: str = "") -> None:
-        super().__init__(_shortened(message, _LONGEST_MESSAGE))
+        super().__init__(without_middle(message))
 
 
 class SpecError(FalsifierError):
@@ -241,7 +241,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     'known: rpm, speed'
     """
     name = name[:_LONGEST_NAME]
-    names = list(dict.fromkeys(_shortened(other, _LONGEST_NAME) for other in known))
+    names = list(dict.fromkeys(without_middle(other, _LONGEST_NAME) for other in known))
     shown = [*names[:_LISTED], *(["..."] if len(names) > _LISTED else [])]
     listing = f"known: {', '.join(shown) or 'none'}"
     # Also names that differ in the case of letters only.
@@ -252,7 +252,8 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"did you mean {found!r}? K{listing[1:]}" if found else listing
 
 
-def _shortened(text: str, most: int) -> str:
+def without_middle(text: str, most: int = _LONGEST_MESSAGE) -> str:
+    """Return a text of at most about so many characters: its beginning and its end."""
     return text if len(text) <= most else f"{text[: most - most // 4]} ... {text[-most // 4 :]}"
 
 

@@ -14,7 +14,7 @@ import click
 from falsifier import __version__
 from falsifier.cli import output
 from falsifier.core.posix import check_memory_limits
-from falsifier.errors import FalsifierError, did_you_mean, reader, remedy, speak_to
+from falsifier.errors import FalsifierError, did_you_mean, reader, remedy, speak_to, without_middle
 from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ def _carried_out(arguments: list[str]) -> int:
     except click.ClickException as error:
         shown = StringIO()
         error.show(shown)
-        warn(shown.getvalue().rstrip("\n"))
+        warn(without_middle(shown.getvalue().rstrip("\n")))
         return 2
     except (click.Abort, KeyboardInterrupt):
         warn("interrupted")
@@ -186,7 +186,7 @@ def _carried_out(arguments: list[str]) -> int:
 
 def _report_refusal(error: OSError) -> int:
     """Print what the operating system refused; return the exit code."""
-    where = "" if error.filename is None else f"{error.filename}: "
+    where = "" if error.filename is None else f"{without_middle(str(error.filename))}: "
     if cure := remedy(error):
         warn(f"falsifier: {where}{error.strerror}{cure}")
     elif not where:

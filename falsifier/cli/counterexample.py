@@ -183,7 +183,6 @@ def _shrink(
     ending = ".csv" if case.is_miss else ".json"
     file = out or beside(case.file, f"shrunk{ending}")
     files.check_ending(file, (ending,))
-    file = file.resolve() if file.is_symlink() else file  # a link is followed, not replaced
     if case.is_miss:
         files.check_out(file)
     files.check_out(file.with_suffix(".json"), begins=_FORMAT, kept=case.file)
@@ -202,6 +201,8 @@ def _shrink(
         confirmation = confirm(problem, found) if found.violated else None
         if confirmation is not None and confirmation.outcome == "refuted" and case.is_miss:
             confirmation = None  # else case.content says so
+        with suppress(OSError):
+            beside(case.file, EXPLANATION).unlink(missing_ok=True)  # it was about another input
         table, data = input_table(problem, found.candidate), file.with_suffix(".json")
         paths = files.saved(file, lambda name: write_csv(table, name, problem.model)) if case.is_miss else []
         if confirmation is not None:
@@ -209,8 +210,6 @@ def _shrink(
             if found.trajectory is not None:  # for reports, which simulate nothing
                 files.saved(file.with_suffix(".npz"), found.trajectory.save)
         paths += files.draw_evaluation(problem, found, file.with_suffix(".png"))
-        with suppress(OSError):
-            beside(case.file, EXPLANATION).unlink(missing_ok=True)  # it was about another input
     content = {
         "violated": found.violated,
         "outcome": confirmation and confirmation.outcome,

@@ -91,10 +91,11 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     time, values that outputs reached, modes and changes of mode. Nothing is simulated.
     """
     picture = directory / "coverage.png" if out is None else files.checked_picture(out)
-    found, name = coverage_of_run(directory), ", ".join(manifest.read(directory).names)
+    found, names = coverage_of_run(directory), manifest.read(directory).names
+    name = ", ".join(names)
     drawn = files.draw(lambda: plot_coverage(found, name), picture)
     text = "\n".join([coverage_text(found, name), *(f"picture: {file}" for file in drawn)])
-    content = {"requirements": name, **coverage_json(found), "picture": next(map(str, drawn), None)}
+    content = {"requirements": names, **coverage_json(found), "picture": next(map(str, drawn), None)}
     conclude(as_shown(text, content, as_json=as_json), FAILED if out and not drawn else 0)
 
 

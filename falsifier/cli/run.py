@@ -10,7 +10,7 @@ import click
 from falsifier.cli import options
 from falsifier.cli.command import Command, command, refuse
 from falsifier.cli.llm_options import check_context, context_option, llm_options, llm_settings, read_budget
-from falsifier.cli.output import as_shown, conclude
+from falsifier.cli.output import INTERRUPTED, as_shown, conclude
 from falsifier.errors import JournalError
 from falsifier.views.terminal import warn
 
@@ -182,15 +182,20 @@ def _finish(results: "list[Result]", *, as_json: bool) -> NoReturn:
     """Write the counterexamples, print the results, and end with the code of what the search found."""
     from falsifier.views.text import result_json, result_text, results_text
 
-    for result in results:
-        if result.directory is not None:
-            _write_counterexamples(result, result.directory)
+    code = None
+    try:
+        for result in results:
+            if result.directory is not None:
+                _write_counterexamples(result, result.directory)
+    except KeyboardInterrupt:
+        code = INTERRUPTED
+        warn("interrupted: the results are complete; falsifier resume writes pictures that are missing")
     for reason in {result.unrecorded for result in results} - {""}:
         warn(f"falsifier: the end of the run could not be recorded: {reason}")
     text = result_text(results[0]) if len(results) == 1 else results_text(results)
     shown = [result_json(result) for result in results]
     statuses = {result.status for result in results}
-    code = next(code for status, code in _EXIT_CODES.items() if status in statuses)
+    code = code or next(code for status, code in _EXIT_CODES.items() if status in statuses)
     conclude(as_shown(text, shown[0] if len(shown) == 1 else shown, as_json=as_json), code)
 
 

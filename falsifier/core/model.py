@@ -140,7 +140,7 @@ class Variable:
 
     def expected(self, value: float) -> str:
         """Say what is expected instead of a value that the type does not have; empty if it has it."""
-        numbers = self.literals.values() or ((0, 1) if self.kind == "boolean" else (round(value),))
+        numbers = self.literals.values() or ((0, 1) if self.kind == "boolean" else (value // 1,))
         least, most = self.type_limits or (-_EXACT, _EXACT)
         least, most = max(least, -_EXACT), min(most, _EXACT)
         if self.kind == "real" or (value in numbers and least <= value <= most):

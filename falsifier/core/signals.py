@@ -96,6 +96,7 @@ class Signal:
             return _held_values(self, int(period.max(initial=0)) + 1)[period]
         return _interpolate(self, at)
 
+    @np.errstate(over="ignore")  # what comes of slopes that no number can state, the simulation tells
     def pieces(self, stop_time: float) -> NDArray[np.float64]:
         """Return the signal on [0, stop_time] as cubic pieces, for solvers that choose their own times.
 

@@ -39,7 +39,9 @@ _SPELLINGS = {
     "<=>": "<->", "=>": "->", "|": "or", "||": "or", "&": "and", "&&": "and", "!": "not",
     "always": "G", "eventually": "F", "until": "U", "next": "X",
 }  # fmt: skip
+_COMMENT = "formulas have no comments; say it in the requirement's description"
 _HINTS = {
+    "#": f"{_COMMENT}; put names that contain it in double quotes",
     "=": "equality is ==, less or equal is <=",
     "%": "write 5% of x as 0.05*x, and a number whose unit is % without the sign",
     "°": "write numbers without units; else quote the name",
@@ -85,8 +87,10 @@ _MISPLACED = {
     **dict.fromkeys("[]", "write windows directly after G, F or U"),
     ")": "there is nothing between the parentheses, or one parenthesis too many",
     "*": "write powers as x^y", "+": "write numbers without a plus sign",
-    "|": "write absolute values as abs(x)",
+    "|": "write absolute values as abs(x)", "//": _COMMENT,
 }  # fmt: skip
+# The same where a symbol does not fit the one before it.
+_SPLIT = {"<>": "unequal is !=", "//": _COMMENT, "==>": "implication is ->", "-->": "implication is ->"}
 JOIN = (
     "join two formulas with and, or, ->; numbers and signals with + - * /; write numbers without units, and "
     "names with blanks in double quotes"
@@ -160,8 +164,8 @@ def hint_at(tokens: Sequence[Token], index: int) -> str:
     pair = "".join(t.text for t in tokens[index : index + 2])
     if found := _MISPLACED.get(pair) or _MISPLACED.get(token.written):
         return found
-    if previous and previous.text + token.text == "<>":
-        return "unequal is !="
+    if previous and (found := _SPLIT.get(previous.written + token.written)):
+        return found
     if previous and previous.text in ("and", "or") and token.text in _COMPARING:
         return "repeat what is compared: x >= 0 and x <= 3"
     if token.kind == "symbol" and previous and previous.written in RESERVED:

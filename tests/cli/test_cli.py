@@ -90,6 +90,14 @@ def test_a_report_on_a_link_to_itself_says_that_nothing_is_there(tmp_path: Path)
     assert "loop: no such directory" in falsifier("report", "loop", cwd=tmp_path, code=2).err
 
 
+@pytest.mark.parametrize(
+    "arguments", [["run"], ["coverage"], ["info"], ["run", "AT1", "--jobs"], ["run", "AT1", "--engine"]]
+)
+def test_of_a_very_long_argument_both_ends_are_told(arguments: list[str], tmp_path: Path) -> None:
+    told = falsifier(*arguments, f"a{'x' * 9000}z", cwd=tmp_path, code=2).err
+    assert "ax" in told and "xz" in told and len(told) < 2500
+
+
 @pytest.mark.parametrize("command", [["run", "AT1"], ["run", "AT"], ["bench", "AT1"], ["simulate", "AT1"]])
 def test_a_folder_with_files_is_kept(command: list[str], tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()

@@ -296,3 +296,28 @@ def test_a_nearest_miss_that_becomes_a_violation_is_written_as_named(tmp_path: P
     assert "was allowed" not in falsifier("explain", "r", "--shrink", "--out", "y.csv", cwd=tmp_path).out
     for again, target in (("x.csv", ["simulate", hard[1], "--inputs"]), ("x.json", ["replay"])):
         assert falsifier(*target, again, cwd=tmp_path).code == 1
+
+
+def test_a_shrinking_that_was_killed_leaves_no_explanation_of_another_input(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(folder)
+    run(folder, "explain", "run", code=0)
+    assert Path("run/explanation.txt").exists()
+    monkeypatch.setattr("falsifier.cli.counterexample.save", killed)
+    assert _carried_out(["explain", "run", "--shrink", "--budget", "3"]) == 130
+    assert not Path("run/explanation.txt").exists()
+
+
+def test_what_was_found_is_told_if_its_picture_is_interrupted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("falsifier.cli.files.draw_evaluation", killed)
+    assert _carried_out(["run", "AT1", "--engine", "corners", "--quiet", "--out", "run"]) == 130
+    told = capsys.readouterr()
+    assert "falsified" in told.out and "the results are complete" in told.err
+
+
+def killed(*_: object, **__: object) -> None:
+    raise KeyboardInterrupt

@@ -78,5 +78,6 @@ def test_what_a_run_tried_is_printed_and_drawn(tmp_path: Path) -> None:
         assert part in done.out, done.out
     assert (tmp_path / "r" / "coverage.png").read_bytes().startswith(b"\x89PNG")
     told = falsifier("coverage", "r", "--json", "--out", "c.png", cwd=tmp_path).json
+    assert told["requirements"] == ["NEVER"]
     assert told["simulations"] == 4
     assert told["picture"] == "c.png" and (tmp_path / "c.png").exists()

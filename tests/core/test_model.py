@@ -185,3 +185,13 @@ def test_a_signal_is_discrete_by_its_type_or_by_its_values(
     kind: str, values: Sequence[float], expected: bool
 ) -> None:
     assert is_discrete(np.array(values, dtype=np.float64), kind=kind) is expected
+
+
+@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan, 2.5])
+def test_no_integer_is_infinite_or_undefined(value: float) -> None:
+    assert Variable("n", "integer").expected(value).startswith("expected an integer")
+
+
+def test_slopes_that_no_number_can_state_leave_no_warning(recwarn: pytest.WarningsRecorder) -> None:
+    assert len(Signal((0.0, 1.0), (1e308, -1e308), "linear").pieces(1.0)) == 2
+    assert not recwarn.list

@@ -274,6 +274,9 @@ def test_items_of_enumerations_may_be_named() -> None:
     for name in (first, f"Kind.{first}"):
         with pytest.raises(SpecError, match=f"unknown signal '{name}'; .*: {first} is {number} of in_Enum"):
             Problem.from_fmu(fixture("Echo_2"), f"G (in_Enumeration == {name})")
+    car = ModelInfo("car", variables=(Variable("car.v"), Variable("place", literals={"front": 1})))
+    with pytest.raises(SpecError, match=r"unknown signal 'car.front'; (did|known)"):
+        parse_requirement("car.front <= 1", car, Experiment(1.0, 0.5, ("car.v",)))
 
 
 def test_every_kind_of_input_with_a_known_range_is_searched_and_of_the_others_the_reason_is_told(
