@@ -95,7 +95,7 @@ def test_formulas_show_how_far_each_operator_reaches(formula: str, text: str) ->
 def test_the_part_of_the_simulation_that_matters_is_told(formula: str, part: str) -> None:
     text = standing(lag_problem(formula))
     assert f"The simulation runs {part}" in text
-    assert ("They are told up to 5.5 s" in text) == ("5.5" in part)
+    assert ("they are told up to 5.5 s" in text) == ("5.5" in part)
 
 
 def test_parameters_are_plain_numbers() -> None:
