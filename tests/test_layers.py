@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -18,6 +19,7 @@ HEAVY = {"rtamt": "stl/second_monitor.py", "litellm": "llm", "matplotlib": "view
 DOOR = ("__init__", "__main__")
 
 
+@cache
 def imports(path: Path) -> list[tuple[str, bool]]:
     """Imported modules of a file, and whether at import time."""
     tree = ast.parse(path.read_text(encoding="utf-8"))

@@ -93,8 +93,8 @@ def took(path: Path, text: str) -> float:
 
 def check(path: Path, make: Callable[[int], str]) -> None:
     took(path, make(LENGTH))  # what is done once
-    ratio = min(took(path, make(TIMES * LENGTH)) / took(path, make(LENGTH)) for _ in range(2))
-    assert ratio < LARGEST_RATIO
+    ratios = (took(path, make(TIMES * LENGTH)) / took(path, make(LENGTH)) for _ in range(2))
+    assert any(ratio < LARGEST_RATIO for ratio in ratios)  # once, unless something disturbed it
 
 
 @pytest.mark.parametrize("end", (".c", ".mo"))

@@ -70,9 +70,8 @@ LONG = {
 
 
 @pytest.mark.parametrize("reply", LONG)
-@pytest.mark.parametrize("size", [100_000, LONGEST_REPLY - 1])
-def test_the_time_to_read_a_reply_grows_with_its_length(reply: str, size: int) -> None:
-    text = LONG[reply](size)
+def test_the_time_to_read_a_reply_grows_with_its_length(reply: str) -> None:
+    text = LONG[reply](LONGEST_REPLY - 1)
     started = time.thread_time()
     try:
         FORM.read(text)

@@ -114,11 +114,12 @@ NO_GUARD = "import errno; cage.without(317 if os.uname().machine == 'x86_64' els
 
 
 @pytest.mark.parametrize("before", [ALL, NO_LANDLOCK, NO_GUARD], ids=["all", "no Landlock", "no guard"])
-@pytest.mark.parametrize("way", range(len(WAYS)), ids=WAYS)
-def test_files_of_others_cannot_be_changed(place: Place, way: int, before: str) -> None:
+def test_files_of_others_cannot_be_changed(place: Place, before: str) -> None:
     known = content(place.home)
     times = (place.home / "victim").stat().st_mtime_ns
-    assert place.run(CHANGE, way, before=before).split()[0] == "0"
+    more = f"for way in range(1, {len(WAYS)}):\n    print(tried({CHANGE}, way))\n"
+    said = place.run(CHANGE, 0, before=before, more=more).splitlines()
+    assert {way: line.split()[0] for way, line in zip(WAYS, said, strict=True)} == dict.fromkeys(WAYS, "0")
     assert content(place.home) == known
     assert (place.home / "victim").stat().st_mtime_ns == times
 

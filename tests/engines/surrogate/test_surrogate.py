@@ -175,7 +175,7 @@ def test_nothing_is_simulated_twice_where_many_points_are_the_same_candidate(
     problem = lag_problem("G[0,10] (x <= 99)", free=FREE, inputs=len(inputs), parameters=parameters)
     ranges = tuple(replace(r, **new) for r, new in zip(problem.space.inputs, inputs, strict=True))
     problem = replace(problem, space=replace(problem.space, inputs=ranges))
-    asked = drive(Surrogate(problem, seed=1), partial(evaluate, problem), rounds=60)
+    asked = drive(Surrogate(problem, seed=1, settings=HASTY), partial(evaluate, problem), rounds=60)
     assert len({c.key for c in asked}) == 60
 
 
