@@ -21,8 +21,8 @@ from falsifier.problem.unit_check import defined_units, unit_conflicts
 from falsifier.search.vacuity import hidden_margin
 from falsifier.stl import Formula
 from falsifier.stl.expression import Name, Number
-from falsifier.stl.formula import And, Bare, Implies, Or, Temporal, Until, Window
-from falsifier.stl.implication import implies, is_flat
+from falsifier.stl.formula import And, Bare, Or, Temporal, Until, Window
+from falsifier.stl.implication import implies
 from falsifier.stl.intervals import Interval, decided
 
 LintKind = Literal[
@@ -38,9 +38,8 @@ class LintFinding:
         requirement: its name.
         kind: ``invalid`` (it cannot be loaded), ``unmoved`` (no input moves it), ``always`` or ``never``
             (it holds or fails for every trajectory in range), ``margin`` (its robustness cannot say how near
-            or how clear a violation is), ``window`` (a window that does not matter), ``units``, ``boolean``
-            (a number stands alone like a Boolean), ``duplicate`` or ``implied`` (by another requirement or
-            part).
+            a violation is), ``window`` (a window that does not matter), ``units``, ``boolean`` (a number
+            stands alone like a Boolean), ``duplicate`` or ``implied`` (by another requirement or part).
         place: the part of the formula; empty if it is about the whole requirement.
         text: what is wrong.
         advice: what to do.
@@ -94,17 +93,9 @@ def static_findings(problem: Problem) -> Iterator[LintFinding]:
     name, formula = problem.name, problem.requirement.formula
     for part, holds in decided(formula, ranges_of(problem)):
         yield _decided(problem, part, holds=holds)
-    yield from (unequal := list(_unequal(problem)))
+    yield from _unequal(problem)
     if hidden := hidden_margin(problem):
         yield LintFinding(name, "margin", "", *hidden)
-    for part in formula.walk():
-        kinds = {problem.info.kind(signal) for signal in part.signals}
-        if isinstance(part, Or | Implies) and "real" in kinds and not unequal and is_flat(part):
-            equal = next(p for p in part.predicates if p.operator in ("==", "!="))
-            text = f"violations all have robustness -0, however clear they are, because of {equal}"
-            advice = f"write abs({equal.left} - {equal.right}) {'<=' if equal.operator == '==' else '>'} 0.5"
-            yield LintFinding(name, "margin", str(part), text, f"{advice} in place of it")
-            break
     yield from _windows(problem)
     for predicate, text in unit_conflicts(formula, problem.info, defined_units(problem.model)):
         yield LintFinding(name, "units", str(predicate), text, "give both sides the same unit")

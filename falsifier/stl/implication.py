@@ -21,26 +21,6 @@ def implies(first: stl.Formula, second: stl.Formula) -> bool:
     return first == second or _by_parts(first, second) or _by_operator(first, second)
 
 
-def is_flat(formula: stl.Formula, *, above: bool = False) -> bool:
-    """Whether the robustness is never below 0 (or above), as == has +0 at most, and != at least -0.
-
-    >>> from falsifier.stl import parse
-    >>> is_flat(parse("G (mode == 4 -> x <= 3)")), is_flat(parse("G (mode == 4)"))
-    (True, False)
-    """
-    match formula:
-        case stl.Predicate(operator):
-            return operator == ("==" if above else "!=")
-        case stl.Not(operand):
-            return is_flat(operand, above=not above)
-        case stl.Implies(a, b):
-            return is_flat(stl.Or(stl.Not(a), b), above=above)
-        case stl.Iff(a, b):
-            return is_flat(stl.And(stl.Implies(a, b), stl.Implies(b, a)), above=above)
-    every = all if isinstance(formula, stl.Or) == above else any  # a maximum, or a minimum
-    return every(is_flat(part, above=above) for part in formula.children)
-
-
 def _by_parts(first: stl.Formula, second: stl.Formula) -> bool:
     """Compare a whole formula with the operands of the other."""
     if isinstance(second, stl.And):
