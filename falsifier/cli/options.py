@@ -7,7 +7,6 @@ or add a remark, a function makes the option.
 import logging
 from collections.abc import Callable, Iterable
 from functools import partial
-from os.path import realpath
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -341,11 +340,7 @@ requirement_option = click.option(
 
 
 def out_option(text: str, *, metavar: str = "FILE") -> Decorator:
-    def follow(_context: click.Context, _option: click.Parameter, path: Path | None) -> Path | None:
-        """Return the file that a link leads to: the link is followed, not replaced."""
-        return Path(realpath(path)) if path and path.is_symlink() and not path.is_dir() else path
-
-    return click.option("-o", "--out", type=PATH, metavar=metavar, help=text, callback=follow)
+    return click.option("-o", "--out", type=PATH, metavar=metavar, help=text)
 
 
 json_option = click.option("--json", "as_json", is_flag=True, help="Print the result as JSON on stdout.")

@@ -24,8 +24,6 @@ OPENING, CLOSING = frozenset("([{"), frozenset(")]}")
 _TOKEN = re.compile(
     r"""
     (?P<blank>\s++)
-  # A cast of C, such as (float)u; before a blank and a name, it may be a condition.
-  | (?P<cast>(?<!\w)\(\s*+[^\W\d]\w*+\s*+\)(?:(?=[\w.])|\s++(?=[\d.])))
   | (?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))
   | (?P<directive>^[ \t]*+\#(?:[^\n\\]|\\.)*+)
   | (?P<number>0[xX][0-9a-fA-F]++\.?[0-9a-fA-F]*+(?:[pP][+-]?\d++)?[a-zA-Z]*+
@@ -165,9 +163,9 @@ def _variables(tokens: Sequence[SourceToken], *, is_dotted: bool) -> Iterator[tu
 
 
 def tokens_of(text: str) -> Iterator[SourceToken]:
-    """Return the tokens of a text in any of the languages, without blanks, comments and casts."""
+    """Return the tokens of a text in any of the languages, without blanks and comments."""
     for found in _TOKEN.finditer(text):
-        if found.lastgroup not in ("blank", "comment", "cast"):
+        if found.lastgroup not in ("blank", "comment"):
             yield SourceToken(found.lastgroup or "", found[0], found.start(), found.end())
 
 

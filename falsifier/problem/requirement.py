@@ -136,7 +136,7 @@ def _unknown(name: str, info: ModelInfo) -> str:
     if word in info:
         return f"unknown signal {name}: single quotes would be part of its name; write {name_text(word)}"
     item = word.rpartition(".")[2]  # also of Mode.Run, unless the model has a component of this name
-    prefix = word.removesuffix(item) or name
+    prefix = word.removesuffix(item) or f"{name}."
     named = [v for v in info.variables if item in v.literals]
     if named and not any(v.name.startswith(prefix) for v in info.variables):
         items = [f"{item} is {v.literals[item]} of {v.name}" for v in named]

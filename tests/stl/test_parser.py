@@ -211,7 +211,7 @@ MISTAKES = [
     ("G (x <= 3 mph)", 11, "without units"),
     ("()", 2, "nothing between"),
     ("[0,5] x", 1, "directly after G"),
-    ("1e999 <= x", 1, "1.79e308"),
+    ("1e999 <= x", 1, "1.8e308"),
     ("x <= 'a", 6, "second one"),
     ("x implies y", 3, "->"),
     ("x <> y", 4, "!="),
