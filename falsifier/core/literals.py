@@ -13,11 +13,9 @@ from decimal import Decimal
 from io import StringIO
 from math import isfinite
 
-# Control characters other than tab and newline, and characters that hide or reorder text.
-_ACTING = r"\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\U000e0000-\U000e007f"
-_CONTROLS = re.compile(f"[{_ACTING}]")
-# These, and what UTF-8 or XML 1.0 cannot contain.
-_UNPRINTABLE = re.compile(rf"[{_ACTING}\ud800-\udfff\ufffe\uffff]")
+# What UTF-8 or XML 1.0 cannot contain, control characters other than tab and newline, and those that reverse
+# the direction of what follows.
+_UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
 # What cannot be part of a string in any language.
 _UNWRITABLE = re.compile("[\x00\ud800-\udfff]")
 _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
@@ -26,6 +24,10 @@ _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 _SEQUENCES = re.compile(
     r"(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]"
     r"|(?:\x1b[\]PX^_]|[\x90\x98\x9d-\x9f])[^\x07\x1b\x80-\x9f\n]*(?:\x07|\x1b\\|\x9c)"
+)
+# All other control characters except newline and tab, and characters that hide or reorder text.
+_CONTROLS = re.compile(
+    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\U000e0000-\U000e007f]"
 )
 _FORMULA_STARTS = tuple("=+-@＝＋－＠\t\n")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
