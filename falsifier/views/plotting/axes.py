@@ -48,15 +48,12 @@ def wrapped(text: str, width: int) -> str:
 
 
 def whole_ticks(axis: "Axis", labels: Mapping[int, str]) -> None:
-    """Put ticks at whole numbers only, with their names if they have any and are not too close."""
+    """Put ticks at whole numbers only, with their names if they have any."""
     from matplotlib.ticker import MaxNLocator
 
     if 0 < len(labels) <= _MOST_TICKS:
-        numbers: list[int] = []
-        for number in sorted(labels):
-            if not numbers or number - numbers[-1] >= (max(labels) - min(labels)) / _MOST_TICKS:
-                numbers.append(number)
-        axis.set_ticks(numbers, labels=[caption(shortened(labels[n], _LONGEST_TICK)) for n in numbers])
+        names = [caption(shortened(labels[number], _LONGEST_TICK)) for number in sorted(labels)]
+        axis.set_ticks(sorted(labels), labels=names)
     else:
         axis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
 

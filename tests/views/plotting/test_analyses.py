@@ -13,7 +13,7 @@ from falsifier.counterexamples.robustness_map import robustness_map
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.testing import START, lag_problem
 from falsifier.views.plotting import plot_coverage, plot_robustness_map, png, save_figure
-from falsifier.views.plotting.axes import own_axes, whole_ticks, wrapped
+from falsifier.views.plotting.axes import wrapped
 from tests.analyses.test_coverage import TIMES, described
 from tests.pictures import CRITICAL, OUTPUT, colours
 from tests.views.plotting.support import xs, ys
@@ -117,11 +117,3 @@ def test_a_single_coordinate_is_a_line_through_the_counterexample(tmp_path: Path
     assert (xs(counterexample).tolist(), ys(counterexample).tolist()) == ([1.0], [start.robustness])
     save_figure(figure, tmp_path / "map.png")
     assert {OUTPUT, CRITICAL} <= colours(tmp_path / "map.png")
-
-
-def test_names_of_numbers_beside_an_axis_do_not_overlap() -> None:
-    ax = own_axes(8, 3)
-    whole_ticks(ax.yaxis, {0: "off", 1: "on", 2: "ready", 1000: "broken"})
-    assert [label.get_text() for label in ax.get_yticklabels()] == ["off", "broken"]
-    whole_ticks(ax.yaxis, {n: f"gear {n}" for n in range(12)})
-    assert len(ax.get_yticklabels()) == 12
