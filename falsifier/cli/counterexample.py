@@ -183,6 +183,7 @@ def _shrink(
     ending = ".csv" if case.is_miss else ".json"
     file = out or beside(case.file, f"shrunk{ending}")
     files.check_ending(file, (ending,))
+    file = file.resolve() if file.is_symlink() else file  # a link is followed, not replaced
     if case.is_miss:
         files.check_out(file)
     files.check_out(file.with_suffix(".json"), begins=_FORMAT, kept=case.file)

@@ -155,7 +155,7 @@ class _Parser:
         if token.kind == "number":
             value = float(token.text)
             if not math.isfinite(value):
-                self._fail(f"the number {token.text} is too large", token.position, "the maximum is about 1.8e308")
+                self._fail(f"the number {token.text} is too large", token.position, "the maximum is 1.8e308")
             return expression.Number(value)
         if token.kind == "name":
             return self._named(token)
