@@ -15,15 +15,16 @@ _BOUNDARIES = frozenset(_BOUNDING.split())
 _DECIMAL = r"(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
 _HEXADECIMAL = r"0[xX][0-9a-fA-F]++(?:\.?[0-9a-fA-F]*+[pP][-+]?\d++)?"
 _NUMBER = re.compile(rf"([-+]?)(?:({_HEXADECIMAL})|({_DECIMAL}))[fFlLuU]*$")
-# What the value of a constant begins with: (float)7.2, and whether it states a number at all.
-_CAST, _STATED = re.compile(r"\(\s*[^\W\d]\w*\s*\)\s*(?=[\d.])"), re.compile(r"(?<!\w)\d")
+# (float)7.2; with a sign, only names of numeric types, as (limit)-3 is a difference.
+_TYPE = r"(?:u?int|float|real|double|single)\d*+(?:_[tT])?"
+_CAST = rf"\(\s*+(?:{_TYPE}\s*+\)\s*+(?=[-+]?\.?\d)|[^\W\d]\w*+\s*+\)\s*+(?=\.?\d))"
 _MAX_LENGTH = 160
 OPENING, CLOSING = frozenset("([{"), frozenset(")]}")
 # Every alternative either takes what it has looked at or gives up after a limited number of characters, so
 # that time grows with the length of a text.
 _TOKEN = re.compile(
+    rf"(?P<blank>\s++|{_CAST})"
     r"""
-    (?P<blank>\s++)
   | (?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))
   | (?P<directive>^[ \t]*+\#(?:[^\n\\]|\\.)*+)
   | (?P<number>0[xX][0-9a-fA-F]++\.?[0-9a-fA-F]*+(?:[pP][+-]?\d++)?[a-zA-Z]*+
@@ -120,8 +121,8 @@ def _threshold(
     named = {paths[path]: value for path, value in known.items() if len(value) <= _MAX_LENGTH}
     stated_values = [value for stated in named.values() for value in stated.split(" or ")]
     variables = frozenset(paths.keys() - known.keys())
-    has_number = any(t.kind == "number" for t in tokens) or any(map(_STATED.search, stated_values))
-    if not variables or not has_number:
+    stating = chain(tokens, *map(tokens_of, stated_values))
+    if not variables or not any(token.kind == "number" for token in stating):
         return None
     levels: tuple[float, ...] = ()
     for side, other in (sides, sides[::-1]):
@@ -135,7 +136,7 @@ def _threshold(
 def _numbers(texts: Iterable[str]) -> Iterator[float]:
     """Return those of some texts that are nothing but a number, and none that is too large for one."""
     for text in texts:
-        if found := _NUMBER.match(_CAST.sub("", text).strip().strip("()")):
+        if found := _NUMBER.match("".join(token.text for token in tokens_of(text)).strip("()")):
             sign, hexadecimal, decimal = found.groups()
             with suppress(OverflowError):
                 number = float(decimal) if decimal else float.fromhex(hexadecimal)

@@ -62,7 +62,8 @@ def test_what_has_no_constant_or_no_variable_is_not_told() -> None:
     assert compared("a > b", b="c + d") == []
     assert compared("> 3") == []
     assert compared("(u) > 3 and abs(v) > 2 and f(x) and w > 1") == ["(u) > 3", "abs(v) > 2", "w > 1"]
-    assert compared("a > b and c > d", b="SCALE(7)", d="x1") == ["a > b (b = SCALE(7))"]
+    stated = {"b": "SCALE(7)", "d": "x1", "f": '"version 5"'}
+    assert compared("a > b and c > d and e > f", **stated) == ["a > b (b = SCALE(7))"]
 
 
 def test_names_values_and_place() -> None:
@@ -86,7 +87,12 @@ def test_kinds_of_tokens_of_all_languages() -> None:
     ]  # fmt: skip
 
 
-CONSTANTS = {"limit": "5 or 9 or something", "cast": "((real_T)7.2F)"}
+CONSTANTS = {
+    "limit": "5 or 9 or something",
+    "cast": "((real_T)7.2F)",
+    "low": "((float)-7.2)",
+    "less": "(c)-7",
+}
 
 
 @pytest.mark.parametrize(
@@ -101,6 +107,11 @@ CONSTANTS = {"limit": "5 or 9 or something", "cast": "((real_T)7.2F)"}
         ("(u > 3", (3.0,)),
         ("u > (3)", (3.0,)),
         ("u > cast", (7.2,)),
+        ("u < low", (-7.2,)),
+        ("u < less", ()),
+        ("u > ( my_real ) .5", (0.5,)),
+        ("if (on) u > 3", (3.0,)),
+        ("u > (float)v + 3", ()),
         ("f(x[i > 3]) > u + 1", (3.0,)),
         ("u > 0x" + 300 * "F", ()),
         ("u > 1e999", ()),
