@@ -23,8 +23,7 @@ from falsifier.search.request import LLMSettings
 from falsifier.stl import Formula, in_words
 from falsifier.stl.formula import And
 from falsifier.stl.implication import implies
-from falsifier.stl.intervals import margins
-from falsifier.stl.margins import ON_LIMIT, shown
+from falsifier.stl.margins import shown
 from falsifier.stl.tell_apart import tell_apart
 
 _LONGEST_SENTENCE = 4000
@@ -162,20 +161,11 @@ def _checked_reading(reply: ReadingReply, subject: Subject, others: Sequence[Rea
         raise RejectedReplyError(str(error)) from None
     _check_units(reply, formula, problem)
     problem = problem.with_requirement(formula)
+    equal = (p for p in formula.predicates if p.operator in ("==", "!="))
+    equates_reals = any(problem.info[n].kind == "real" for p in equal for n in p.signals)  # not whole numbers
     for found in static_findings(problem):
-        if found.kind in ("always", "never", "units"):
+        if found.kind in ("always", "never", "units") or (found.kind == "margin" and equates_reals):
             raise RejectedReplyError(f"{found.place or formula}: {found.text}; {found.advice}")
-    compares_reals = any(  # whole numbers can be equal
-        problem.info[name].kind == "real"
-        for predicate in formula.predicates
-        if predicate.operator in ("==", "!=")
-        for name in predicate.signals
-    )
-    if compares_reals and margins(formula, ranges_of(problem)).low == -ON_LIMIT:
-        raise RejectedReplyError(
-            "it can be violated only exactly on its limit, so that no margin leads a search: "
-            "for x == 3 write abs(x - 3) <= 0.5"
-        )
     _check_examples(reply, formula, problem)
     for number, other in enumerate(others, start=1):
         if implies(formula, other.formula) and implies(other.formula, formula):

@@ -38,8 +38,9 @@ class LintFinding:
         requirement: its name.
         kind: ``invalid`` (it cannot be loaded), ``unmoved`` (no input moves it), ``always`` or ``never``
             (it holds or fails for every trajectory in range), ``margin`` (its robustness cannot say how near
-            a violation is), ``window`` (a window that does not matter), ``units``, ``boolean`` (a number
-            stands alone like a Boolean), ``duplicate`` or ``implied`` (by another requirement or part).
+            or how clear a violation is), ``window`` (a window that does not matter), ``units``, ``boolean``
+            (a number stands alone like a Boolean), ``duplicate`` or ``implied`` (by another requirement or
+            part).
         place: the part of the formula; empty if it is about the whole requirement.
         text: what is wrong.
         advice: what to do.
@@ -93,8 +94,8 @@ def static_findings(problem: Problem) -> Iterator[LintFinding]:
     name, formula = problem.name, problem.requirement.formula
     for part, holds in decided(formula, ranges_of(problem)):
         yield _decided(problem, part, holds=holds)
-    yield from _unequal(problem)
-    if hidden := hidden_margin(problem):
+    yield from (unequal := list(_unequal(problem)))
+    if not unequal and (hidden := hidden_margin(problem)):
         yield LintFinding(name, "margin", "", *hidden)
     yield from _windows(problem)
     for predicate, text in unit_conflicts(formula, problem.info, defined_units(problem.model)):

@@ -18,6 +18,7 @@ from falsifier.problem.problem import Problem
 from falsifier.search.findings import Finding, FindingKind
 from falsifier.stl.expression import Number
 from falsifier.stl.formula import Formula, Implies, Next, Or, Predicate, Temporal
+from falsifier.stl.intervals import without_equality
 from falsifier.stl.margins import is_on_limit, shown, signed
 
 # A predicate is far from its threshold if it stays away by this multiple of the range over which it moves.
@@ -199,8 +200,19 @@ def _reached(formula: Formula, values: Mapping[str, float]) -> str:
 
 
 def hidden_margin(problem: Problem) -> tuple[str, str] | None:
-    """Return why Booleans leave a requirement's robustness without a margin, and what to do; None if not."""
-    signals, info = problem.requirement.formula.signals, problem.info
+    """Return why Booleans, or ==, leave the robustness without a margin, and what to do; None if not."""
+    formula, info = problem.requirement.formula, problem.info
+    if tolerant := without_equality(formula):
+        what = (
+            "the requirement can be violated only exactly on its limit, with robustness -0, however clear "
+            "the violation is, because == has robustness +0 where it holds"
+        )
+        equal = [p for p in formula.predicates if p.operator in ("==", "!=")]
+        if any(info.kind(name) == "real" for p in equal for name in p.signals):
+            return what, "compare with a tolerance: for x == 3 write abs(x - 3) <= 0.5"
+        if len(equal) < len(formula.predicates):
+            return what, f"write {tolerant}"
+    signals = formula.signals
     if not signals or any(info.kind(name) != "boolean" for name in signals):
         return None
     names_are = f"{listed(signals)} {'is' if len(signals) == 1 else 'are'}"

@@ -9,8 +9,20 @@ from dataclasses import dataclass
 from operator import mul, truediv
 
 from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Negative, Number
-from falsifier.stl.formula import And, Formula, Iff, Implies, Next, Not, Or, Predicate, Temporal, Until
-from falsifier.stl.margins import on_limit
+from falsifier.stl.formula import (
+    And,
+    Formula,
+    Iff,
+    Implies,
+    Next,
+    Not,
+    Or,
+    Predicate,
+    Temporal,
+    Until,
+    replaced,
+)
+from falsifier.stl.margins import ON_LIMIT, on_limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +99,26 @@ def decided(formula: Formula, ranges: Mapping[str, Interval]) -> Iterator[tuple[
     else:
         for child in formula.children:
             yield from decided(child, ranges)
+
+
+def without_equality(formula: Formula) -> Formula | None:
+    """Return the same for whole numbers with margins in place of == and !=, if that gives violations one.
+
+    >>> from falsifier.stl import parse
+    >>> without_equality(parse("G (gear == 3 -> speed <= 9)"))
+    parse('G (abs(gear - 3) <= 0.5 -> speed <= 9)')
+    >>> without_equality(parse("G (speed <= 9 -> gear == 3)"))
+    """
+    if margins(formula, {}).low != -ON_LIMIT:
+        return None
+    parts = {p: _tolerant(p) for p in formula.predicates if p.operator in ("==", "!=")}
+    tolerant = replaced(formula, parts)
+    return tolerant if margins(tolerant, {}).low < -ON_LIMIT else None
+
+
+def _tolerant(equal: Predicate) -> Predicate:
+    distance = Call("abs", (Arithmetic("-", equal.left, equal.right),))
+    return Predicate("<=" if equal.operator == "==" else ">", distance, Number(0.5))
 
 
 def _smallest(parts: list[Interval]) -> Interval:

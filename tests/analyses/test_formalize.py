@@ -149,7 +149,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         {"violated": [{"name": "speed", "times": [5, 0], "values": [0, 200]}]},
         "in order",
     ),
-    "no margin by ==": ({"formula": "G[0,20] (rpm == 2 -> speed <= 120)"}, "only exactly on its limit"),
+    "no margin by ==": ({"formula": "G[0,20] (rpm == 2 -> speed <= 120)"}, "compare with a tolerance"),
 }  # fmt: skip
 
 
