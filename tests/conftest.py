@@ -1,6 +1,8 @@
 """What all tests share: no keys in the environment, no network but this machine's own, an own cache."""
 
+import gc
 import os
+import signal
 import socket
 from collections.abc import Iterator
 from contextlib import suppress
@@ -71,6 +73,17 @@ def at_the_command_line() -> Iterator[None]:
     speak_to("command line")
     yield
     speak_to("Python")
+
+
+@pytest.fixture
+def stoppable() -> Iterator[None]:
+    """Ctrl-C raises KeyboardInterrupt, whoever runs the tests; callbacks of hypothesis would lose it."""
+    callbacks = gc.callbacks[:]
+    gc.callbacks.clear()
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+    gc.callbacks.extend(callbacks)
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@ import fcntl
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -48,14 +47,6 @@ def test_a_program_ends_as_the_one_that_it_watches(tmp_path: Path) -> None:
         program.send(b"end\n", HANG)
         assert program.ends_within(HANG)
         assert program.end() == 5
-
-
-@pytest.fixture
-def stoppable() -> Iterator[None]:
-    """Ctrl-C raises KeyboardInterrupt, whoever runs the tests."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.usefixtures("stoppable")

@@ -125,18 +125,15 @@ def test_a_script_may_be_a_function_and_says_when_it_ends() -> None:
         chat.complete(QUESTION)
 
 
+@pytest.mark.usefixtures("stoppable")
 def test_a_reply_that_was_paid_for_is_recorded_though_ctrl_c_comes_while_it_is_read() -> None:
     def read(text: str) -> int:
         signal.raise_signal(signal.SIGINT)
         return number(text)
 
     exchanges: list[Exchange] = []
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        with pytest.raises(KeyboardInterrupt):
-            converse(ScriptedChat(["7"]), QUESTION, read, exchanges.append)
-    finally:
-        signal.signal(signal.SIGINT, before)
+    with pytest.raises(KeyboardInterrupt):
+        converse(ScriptedChat(["7"]), QUESTION, read, exchanges.append)
     assert [e.problem for e in exchanges] == [None]
 
 

@@ -108,6 +108,7 @@ def test_the_time_of_a_question_that_is_interrupted_is_the_engines() -> None:
     assert result.status == "interrupted" and result.spent.engine_seconds >= 0.05
 
 
+@pytest.mark.usefixtures("stoppable")
 @pytest.mark.parametrize(
     ("within", "kind"), [("search.loop.judge", "evaluated"), ("search.events.Confirmed", "confirmed")]
 )
@@ -123,12 +124,8 @@ def test_what_was_simulated_is_recorded_before_ctrl_c_ends_the_run(
 
     monkeypatch.setattr(f"falsifier.{within}", interrupted)
     monkeypatch.setattr("falsifier.search.loop._WORTH_KEEPING", 0.0)
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        problems = [lag_problem(name="A"), lag_problem(name="B")]
-        results = falsify(problems, "corners", budget=20, directory=tmp_path)
-    finally:
-        signal.signal(signal.SIGINT, before)
+    problems = [lag_problem(name="A"), lag_problem(name="B")]
+    results = falsify(problems, "corners", budget=20, directory=tmp_path)
     assert "interrupted" in {result.status for result in results}
     assert [r.kind for r in read_journal(tmp_path)][-2:] == [kind, "ended"]
 
