@@ -205,7 +205,7 @@ def hidden_margin(problem: Problem) -> tuple[str, str] | None:
     if tolerant := without_equality(formula):
         what = (
             "the requirement can be violated only exactly on its limit, with robustness -0, however clear "
-            "the violation is, because == has robustness +0 where it holds"
+            "the violation is, because == and != have no margin where both sides are equal"
         )
         equal = [p for p in formula.predicates if p.operator in ("==", "!=")]
         if any(info.kind(name) == "real" for p in equal for name in p.signals):
