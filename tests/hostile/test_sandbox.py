@@ -24,7 +24,7 @@ pytestmark = [
 ]
 
 # As in tests/fixtures/fmus/src/hostile.h; CRASH makes a simulation fail after a misdeed.
-CRASH = 11
+NOTHING, CRASH = 0, 11
 CHANGE, READ_KEY, EXECUTE, BECOME, MEDDLE, DAEMONISE, BIG_FILE, SHARE, SHUT, REDIRECT, CONNECT = range(13, 24)
 CLOSE = 9
 WAYS = (
@@ -34,6 +34,7 @@ WAYS = (
     "change times",
 )  # fmt: skip
 CREATE, OVERWRITE = WAYS.index("create"), WAYS.index("overwrite")
+TRUNCATE = WAYS.index("truncate")
 
 SCRIPT = """
 import os, sys
@@ -122,6 +123,42 @@ def test_files_of_others_cannot_be_changed(place: Place, before: str) -> None:
     assert {way: line.split()[0] for way, line in zip(WAYS, said, strict=True)} == dict.fromkeys(WAYS, "0")
     assert content(place.home) == known
     assert (place.home / "victim").stat().st_mtime_ns == times
+
+
+STAYS = f"""
+from tests.fmu.fixtures import worker
+pid, link = worker(model).program.pid, Path(os.environ["HOSTILE_LICENSE"]) / "victim"
+def try_behind(target, times):
+    link.unlink()
+    link.symlink_to(target)
+    return [tried({CHANGE}, {TRUNCATE}).split()[0] for _ in range(times)]
+def memory():
+    return int(Path(f"/proc/{{pid}}/status").read_text().split("VmRSS:")[1].split()[0])
+"""
+
+
+def test_the_guard_survives_links_to_what_has_no_path(place: Place) -> None:
+    """Descriptor 5 is its line, a socket."""
+    more = f"{STAYS}print(try_behind('/proc/self/fd/5', 3), worker(model).program.pid == pid)"
+    assert place.run(NOTHING, more=more).splitlines()[-1] == "['0', '0', '0'] True"
+
+
+def test_the_guard_keeps_no_memory_of_what_it_does_not_tell(place: Place) -> None:
+    """It tells of 32 files. Each of the last simulations has a call refused, for a path of 3 kB."""
+    deep = place.home.joinpath(*(16 * ["x" * 200]))
+    deep.mkdir(parents=True)
+    more = f"""{STAYS}
+for k in range(40):
+    (link.parent / str(k)).touch()
+    try_behind(link.parent / str(k), 1)
+target = Path({str(deep)!r}, "file")
+target.touch()
+try_behind(target, 20)
+before = memory()
+try_behind(target, 300)
+print(memory() - before < 300)
+"""
+    assert place.run(NOTHING, more=more).splitlines()[-1] == "True"
 
 
 @pytest.mark.parametrize("before", [ALL, NO_LANDLOCK])

@@ -279,14 +279,14 @@ static int is_beneath(const char *path, const char **places)
     return 0;
 }
 
-/* The path of an open file without links; 0 if it has none. */
+/* The path of an open file without links; 0 if it has none, such as a pipe. */
 static int path_of(int file, char *path)
 {
     char place[64];
     snprintf(place, sizeof place, "/proc/self/fd/%d", file);
     const ssize_t length = readlink(place, path, PATH_MAX - 1);
     path[length > 0 ? length : 0] = 0;
-    return length > 0;
+    return *path == '/';
 }
 
 /* Replace a path by that of the file that it leads to; 0 if there is none. Much faster than realpath for deep ones. */

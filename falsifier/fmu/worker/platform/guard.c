@@ -46,8 +46,8 @@ void tell(enum told what, const char *path)
 {
     static char *told[MOST_TOLD];
     static size_t count;
-    char *text = malloc(strlen(path) + 2);
-    if (!text || count == MOST_TOLD)
+    char *text = count < MOST_TOLD ? malloc(strlen(path) + 2) : NULL;
+    if (!text)
         return;
     text[0] = (char)what;
     strcpy(text + 1, path);
