@@ -22,6 +22,7 @@ from falsifier.problem.source import Target
 from falsifier.record import manifest
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
 from falsifier.record.questions import doubtful_confirmations
+from falsifier.search.make_engines import LLM_ENGINES
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
 
@@ -69,13 +70,21 @@ def assess(
 @options.problem_options
 @options.stl_option("Formula or template with {limit} in place of a threshold.", required=True)
 @click.option("--between", required=True, metavar="LOW:HIGH", help="Smallest and largest threshold.")
-@click.option("--engine", metavar="NAME", default=DEFAULT_ENGINE, show_default=True, help="Search engine.")
+@options.engine_option(without=LLM_ENGINES)
 @options.budget_option(least=20, note=" of all searches together")
 @options.seed_option()
 @options.quiet_option
 @options.json_option
 def margin(
-    *, stl: str, between: str, engine: str, budget: int, seed: int, quiet: bool, as_json: bool, **given: Any
+    *,
+    stl: str,
+    between: str,
+    engine: str | None,
+    budget: int,
+    seed: int,
+    quiet: bool,
+    as_json: bool,
+    **given: Any,
 ) -> None:
     """Find the threshold at which a search starts to find violations.
 
@@ -97,7 +106,8 @@ def margin(
 
     problem = load_source(options.problem_source(given | requirement))
     with closing(problem.model):
-        found = find_margin(problem, stl, (low, high), engine=engine, budget=budget, seed=seed, searched=said)
+        how: dict[str, Any] = {"engine": engine or DEFAULT_ENGINE, "budget": budget, "seed": seed}
+        found = find_margin(problem, stl, (low, high), **how, searched=said)
     content = {"stl": stl, "between": [low, high], **asdict(found)}
     text = as_shown(one_line(f"{stl}: {found.text}"), content, as_json=as_json)
     conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
