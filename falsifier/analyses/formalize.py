@@ -164,7 +164,7 @@ def _checked_reading(reply: ReadingReply, subject: Subject, others: Sequence[Rea
     problem = problem.with_requirement(formula)
     for found in static_findings(problem):
         if found.kind in ("always", "never", "units"):
-            raise RejectedReplyError(f"{found.place or formula}: {found.text}; {found.advice}")
+            raise RejectedReplyError(f"{found.part or formula}: {found.text}; {found.advice}")
     compares_reals = any(  # whole numbers can be equal
         problem.info[name].kind == "real"
         for predicate in formula.predicates

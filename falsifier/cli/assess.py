@@ -1,7 +1,6 @@
 """``falsifier assess`` and ``falsifier margin``: what a search that found nothing says."""
 
 from contextlib import closing
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -59,7 +58,7 @@ def assess(
     problem, search = _loaded(given, requirement)
     with closing(problem.model):
         found = assess_problem(problem, budget=budget, seed=seed, progress=said, **search)
-    content = assurance_json(found) | {"budget": budget, "seed": seed}
+    content = assurance_json(found)
     lines = [f"{problem.name}: {problem.requirement.formula}"]
     lines += [f"  {line}" for line in found.text.splitlines()]
     code = INTERRUPTED if found.interrupted else 1 if found.violations else 0
@@ -108,9 +107,18 @@ def margin(
     with closing(problem.model):
         how: dict[str, Any] = {"engine": engine or DEFAULT_ENGINE, "budget": budget, "seed": seed}
         found = find_margin(problem, stl, (low, high), **how, searched=said)
-    content = {"stl": stl, "between": [low, high], **asdict(found)}
+    content = {
+        "formula": stl,
+        "between": [low, high],
+        "falsified_at": found.falsified_at,
+        "unfalsified_at": found.unfalsified_at,
+        "searches": [{"threshold": at, "falsified": falsified} for at, falsified in found.searches],
+        "complete": found.complete,
+        "interrupted": found.interrupted,
+        "spent": {"simulations": found.simulations},
+    }
     text = as_shown(one_line(f"{stl}: {found.text}"), content, as_json=as_json)
-    conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
+    conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified_at is None else 1)
 
 
 def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, dict[str, Any]]:
