@@ -110,6 +110,12 @@ def test_marks_are_replaced_by_tables(site: dict[str, Page]) -> None:
     assert f"{DEFAULT_ENGINE} (default)" in engines and f"{DEFAULT_VARIANT} (default)" in llms
 
 
+def test_every_command_that_prints_json_has_a_table_of_its_keys() -> None:
+    tables = run_path(str(ROOT / "docs" / "scripts" / "json_keys.py"))["_COMMANDS"].values()
+    printing = [name for name, command in commands(cli) if any("--json" in p.opts for p in command.params)]
+    assert {n for n in printing if not any(t.startswith(f"{n} ") for t in tables)} == {"resume", "bench"}
+
+
 def test_the_command_page_has_every_command_and_option(site: dict[str, Page]) -> None:
     text = site["commands/index.html"].text
     found = dict(commands(cli))

@@ -50,14 +50,14 @@ class Searched:
 
     Attributes:
         simulations: number of simulations of the search.
-        smallest: smallest robustness that it found; None if every simulation failed.
+        smallest_robustness: smallest robustness that it found; None if every simulation failed.
         violation: in how many simulations it found a violation that no confirmation doubts; None without one.
         drawable: whether the inputs of that violation are among those that are drawn.
         unconfirmed: how many violations were not confirmed.
     """
 
     simulations: int
-    smallest: float | None
+    smallest_robustness: float | None
     violation: int | None = None
     drawable: bool = True
     unconfirmed: int = 0
@@ -76,7 +76,7 @@ class Assurance:
         failures: why simulations among them failed; the bounds count them as violations where that is worse.
         bound: one-sided upper confidence bound on the probability of a violation, exact.
         interval: exact two-sided confidence interval of that probability; from 0 without violations.
-        smallest: the drawn evaluation with the smallest robustness, without its trajectory.
+        best: the drawn evaluation with the smallest robustness, without its trajectory.
         searched: what a search found; None if none was given.
         findings: what no simulation tested; empty with violations.
         interrupted: whether the user stopped it; everything refers to what was drawn by then.
@@ -90,7 +90,7 @@ class Assurance:
     failures: tuple[Failure, ...]
     bound: float
     interval: tuple[float, float]
-    smallest: Evaluation
+    best: Evaluation
     searched: Searched | None = None
     findings: tuple[Finding, ...] = ()
     interrupted: bool = False
@@ -113,7 +113,7 @@ class Assurance:
         if any(finding.untested for finding in self.findings):
             lines.append("That is true, but says little: a part of the requirement was not tested.")
         lines += [f"Note: {finding.text}" for finding in self.findings]
-        smallest = _robustness(self.smallest)
+        smallest = _robustness(self.best)
         lines.append(f"The smallest robustness of these was {signed(smallest)} ({margin_words(smallest)}).")
         if self.searched is not None:
             lines.append(self._searched_text(self.searched))
@@ -128,12 +128,12 @@ class Assurance:
     def _searched_text(self, searched: Searched) -> str:
         if searched.violation is None:
             effort = f"A search of {counted(searched.simulations, 'simulation')}"
-            if searched.smallest is None:
+            if (least := searched.smallest_robustness) is None:
                 return f"{effort} has no verdict: all of them failed."
-            nearer = "came nearer" if searched.smallest < _robustness(self.smallest) else "came no nearer"
+            nearer = "came nearer" if least < _robustness(self.best) else "came no nearer"
             doubtful = searched.unconfirmed
             doubt = f" ({counted(doubtful, 'violation')}, not confirmed)" if doubtful else ""
-            return f"{effort} {nearer}: its smallest robustness was {signed(searched.smallest)}{doubt}."
+            return f"{effort} {nearer}: its smallest robustness was {signed(least)}{doubt}."
         found = f"The search found a violation in {counted(searched.violation, 'simulation')}"
         if not searched.drawable:
             return f"{found}, with control points that are not drawn here: the bound says nothing about it."
@@ -212,7 +212,7 @@ def assess(
             lower_bound(violations, len(drawn), each),
             upper_bound(violations + failures, len(drawn), each),
         ),
-        smallest=min(judged, key=_robustness),
+        best=min(judged, key=_robustness),
         searched=_told(searched, doubtful, problem.space),
         findings=() if violations else vacuity.findings(is_all=is_all),
         interrupted=interrupted,

@@ -165,7 +165,7 @@ def _checked_reading(reply: ReadingReply, subject: Subject, others: Sequence[Rea
     equates_reals = any(problem.info[n].kind == "real" for p in equal for n in p.signals)  # not whole numbers
     for found in static_findings(problem):
         if found.kind in ("always", "never", "units") or (found.kind == "margin" and equates_reals):
-            raise RejectedReplyError(f"{found.place or formula}: {found.text}; {found.advice}")
+            raise RejectedReplyError(f"{found.part or formula}: {found.text}; {found.advice}")
     _check_examples(reply, formula, problem)
     for number, other in enumerate(others, start=1):
         if implies(formula, other.formula) and implies(other.formula, formula):

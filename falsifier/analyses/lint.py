@@ -41,14 +41,14 @@ class LintFinding:
             or how clear a violation is), ``window`` (a window that does not matter), ``units``, ``boolean``
             (a number stands alone like a Boolean), ``duplicate`` or ``implied`` (by another requirement or
             part).
-        place: the part of the formula; empty if it is about the whole requirement.
+        part: the part of the formula; empty if it is about the whole requirement.
         text: what is wrong.
         advice: what to do.
     """
 
     requirement: str
     kind: LintKind
-    place: str
+    part: str
     text: str
     advice: str
 

@@ -39,16 +39,16 @@ class Margin:
     """Between which thresholds a requirement starts to be violated.
 
     Attributes:
-        falsified: threshold nearest to the other one with a confirmed violation; None if there was none.
-        unfalsified: threshold nearest to it at which a search found nothing; None if all were falsified.
+        falsified_at: threshold nearest to the other one with a confirmed violation; None if there was none.
+        unfalsified_at: threshold nearest to it at which a search found nothing; None if all were falsified.
         simulations: number of simulations of all searches together, without confirmations.
         searches: the thresholds that were searched, in order, and whether a violation was confirmed.
         complete: whether the two are close enough; False: the budget was used up before.
         interrupted: whether the user stopped it; the thresholds are what was known by then.
     """
 
-    falsified: float | None
-    unfalsified: float | None
+    falsified_at: float | None
+    unfalsified_at: float | None
     simulations: int
     searches: tuple[tuple[float, bool], ...]
     complete: bool
@@ -58,14 +58,14 @@ class Margin:
     def text(self) -> str:
         """The result in one sentence."""
         effort = f"({counted(self.simulations, 'simulation')}, {counted(len(self.searches), 'search')})"
-        ends = [] if self.falsified is None else [f"falsified at {self.falsified:.12g}"]
-        ends += [] if self.unfalsified is None else [f"not falsified at {self.unfalsified:.12g}"]
+        ends = [] if self.falsified_at is None else [f"falsified at {self.falsified_at:.12g}"]
+        ends += [] if self.unfalsified_at is None else [f"not falsified at {self.unfalsified_at:.12g}"]
         if self.interrupted:
             return f"{', '.join(ends) or 'nothing is known yet'} {effort}; stopped by the user"
-        if self.unfalsified is None:
-            ends = [f"falsified in the whole range, even at {self.falsified:.12g}"]
-        elif self.falsified is None:
-            ends = [f"not falsified in the whole range, not even at {self.unfalsified:.12g}"]
+        if self.unfalsified_at is None:
+            ends = [f"falsified in the whole range, even at {self.falsified_at:.12g}"]
+        elif self.falsified_at is None:
+            ends = [f"not falsified in the whole range, not even at {self.unfalsified_at:.12g}"]
         more = "" if self.complete else "; a larger budget narrows it"
         return f"{', '.join(ends)} {effort}{more}"
 

@@ -134,7 +134,7 @@ class Revalidated:
     """Result of re-simulating one claimed counterexample: whether the claim is accepted, and why."""
 
     row: Row
-    holds: bool
+    accepted: bool
     robustness: float | None  # None if there was no simulation
     reason: str
 
@@ -235,8 +235,8 @@ def _row(number: int, cells: Mapping[str, str], path: Path) -> Row:
 
 
 def _checked(row: Row, budget: int) -> Revalidated:
-    def result(reason: str, robustness: float | None = None, *, holds: bool = False) -> Revalidated:
-        return Revalidated(row, holds, robustness, reason)
+    def result(reason: str, robustness: float | None = None, *, accepted: bool = False) -> Revalidated:
+        return Revalidated(row, accepted, robustness, reason)
 
     if row.simulations > budget:
         return result(f"used {row.simulations} simulations, more than the limit of {budget}")
@@ -250,9 +250,9 @@ def _checked(row: Row, budget: int) -> Revalidated:
     if robustness is None:
         return result(f"simulation failed: {evaluation.reason}")
     if robustness < 0:
-        return result("reproduced", robustness, holds=True)
+        return result("reproduced", robustness, accepted=True)
     if robustness < allowed:
-        return result(f"accepted, within the tolerance of {allowed:g}", robustness, holds=True)
+        return result(f"accepted, within the tolerance of {allowed:g}", robustness, accepted=True)
     return result("not reproduced", robustness)
 
 

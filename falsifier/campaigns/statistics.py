@@ -29,25 +29,20 @@ R = TypeVar("R", bound=RunProgress)
 class Statistics:
     """Statistics of several runs.
 
-    All but ``unfinished``, ``best`` and ``budgets`` are of finished runs; the tables say which these are.
+    All but ``unfinished_runs``, ``smallest_robustness`` and ``budgets`` are of finished runs; the tables say
+    which these are.
 
     Attributes:
         runs: number of finished runs.
-        falsified: number of runs with a confirmed counterexample.
-        unfinished: number of runs that ended before, are still running, or have not begun.
+        falsified_runs: number of runs with a confirmed counterexample.
+        unfinished_runs: number of runs that ended before, are still running, or have not begun.
         mean: mean number of simulations over the falsified runs; None if there is none.
         median: median of the same.
         deviation: sample standard deviation of the same; None below two falsified runs.
         rate_interval: 95 % Wilson interval of the share of falsified runs; None below five finished runs.
         mean_interval: 95 % percentile bootstrap interval of the mean; None below five falsified runs.
-        best: smallest robustness of any run.
-        simulation_seconds: mean time in the simulator per run.
-        seconds: mean wall-clock time per run.
-        tokens: mean number of tokens per run.
-        cost: mean cost per run in US dollars; None if unknown.
-        simulations: number of simulations of all runs.
-        failures: those among them that failed.
-        kept: replies from the cache in all runs, whose tokens and cost are not counted.
+        smallest_robustness: smallest robustness of any run.
+        spent: what the runs have spent together.
         budgets: the different limits on the simulations of a run, in ascending order.
         known: number of runs that began with known inputs.
         repeated: number of runs without a language model that have the seed of another one: nothing new.
@@ -55,21 +50,15 @@ class Statistics:
     """
 
     runs: int
-    falsified: int
-    unfinished: int
+    falsified_runs: int
+    unfinished_runs: int
     mean: float | None
     median: float | None
     deviation: float | None
     rate_interval: Interval | None
     mean_interval: Interval | None
-    best: float | None
-    simulation_seconds: float
-    seconds: float
-    tokens: float
-    cost: float | None
-    simulations: int
-    failures: int
-    kept: int
+    smallest_robustness: float | None
+    spent: Spent
     budgets: tuple[int, ...]
     known: int
     repeated: int
@@ -81,26 +70,18 @@ def statistics(runs: Iterable[RunProgress]) -> Statistics:
     runs = list(runs)
     finished = [run for run in runs if run.counts]
     counts = np.array([run.simulations for run in finished if run.falsified], dtype=np.float64)
-    spent = sum((run.spent for run in finished), Spent())
-    share = 1 / max(len(finished), 1)
     seeds = [run.seed for run in finished if not run.method.llm]
     return Statistics(
         runs=len(finished),
-        falsified=len(counts),
-        unfinished=len(runs) - len(finished),
+        falsified_runs=len(counts),
+        unfinished_runs=len(runs) - len(finished),
         mean=float(counts.mean()) if counts.size else None,
         median=float(np.median(counts)) if counts.size else None,
         deviation=float(counts.std(ddof=1)) if counts.size > 1 else None,
         rate_interval=wilson(len(counts), len(finished)) if len(finished) >= _FEWEST_RUNS else None,
         mean_interval=bootstrap(counts) if counts.size >= _FEWEST_RUNS else None,
-        best=min((run.verdict.robustness for run in runs if run.verdict), default=None),
-        simulation_seconds=spent.simulation_seconds * share,
-        seconds=spent.seconds * share,
-        tokens=spent.tokens * share,
-        cost=None if spent.cost is None else spent.cost * share,
-        simulations=spent.simulations,
-        failures=spent.failures,
-        kept=spent.kept,
+        smallest_robustness=min((run.verdict.robustness for run in runs if run.verdict), default=None),
+        spent=sum((run.spent for run in finished), Spent()),
         budgets=tuple(sorted({limit for run in runs if (limit := run.request.budget.simulations)})),
         known=sum(bool(run.request.start_from) for run in finished),
         repeated=len(seeds) - len(set(seeds)),

@@ -180,7 +180,7 @@ def main_table(runs: Iterable[RunProgress], published: Published) -> Table:
             cells = map(known.get, names)
             row += [rank, *(f"{cell.tool} {cell.text}".strip() if cell else "" for cell in cells)]
         rows.append(tuple(row))
-    notes = {_UNFINISHED} if any(s.unfinished for s in found.values()) else set[str]()
+    notes = {_UNFINISHED} if any(s.unfinished_runs for s in found.values()) else set[str]()
     for told, count in _COUNTED.items():
         rows_of = (f"{r} {m.label} {n}" for (r, m), s in found.items() if (n := count(s)))
         notes |= {f"{told}: {listed}." for listed in [", ".join(rows_of)] if listed}
@@ -234,23 +234,23 @@ def comparable(run: RunProgress) -> bool:
 
 def score(found: Statistics) -> Score:
     """Reduce statistics to the values that published tables contain: FR and mean S."""
-    return Score(found.falsified, found.runs, found.mean)
+    return Score(found.falsified_runs, found.runs, found.mean)
 
 
 # Columns with what they show of the statistics.
 _NUMBERS: Mapping[str, Callable[[Statistics], str]] = {
-    "FR": lambda s: f"{s.falsified}/{s.runs}" + (f" +{s.unfinished}" if s.unfinished else ""),
+    "FR": lambda s: f"{s.falsified_runs}/{s.runs}" + (f" +{s.unfinished_runs}" if s.unfinished_runs else ""),
     "budget": lambda s: ", ".join(map(str, s.budgets)) or NONE,
     "FR 95 %": lambda s: _interval(s.rate_interval, 2),
     "mean S": lambda s: _number(s.mean, 1),
     "mean 95 %": lambda s: _interval(s.mean_interval, 1),
     "median S": lambda s: _number(s.median, 1),
     "std S": lambda s: _number(s.deviation, 1),
-    "best robustness": lambda s: NONE if s.best is None else signed(s.best, 4),
-    "sim. s": lambda s: _number(s.simulation_seconds if s.runs else None, 2),
-    "total s": lambda s: _number(s.seconds if s.runs else None, 2),
-    "tokens": lambda s: _number(s.tokens if s.runs else None, 0),
-    "cost $": lambda s: "unknown" if s.runs and s.cost is None else _number(s.cost if s.runs else None, 4),
+    "best robustness": lambda s: NONE if s.smallest_robustness is None else signed(s.smallest_robustness, 4),
+    "sim. s": lambda s: _per_run(s, s.spent.simulation_seconds, 2),
+    "total s": lambda s: _per_run(s, s.spent.seconds, 2),
+    "tokens": lambda s: _per_run(s, s.spent.tokens, 0),
+    "cost $": lambda s: "unknown" if s.spent.cost is None else _per_run(s, s.spent.cost, 4),
 }
 _LEGEND = (
     "FR: falsified runs / finished runs (those that falsified, spent their budget or tried all candidates). "
@@ -270,8 +270,10 @@ _UNFINISHED = (
 )
 # What is said below the table of rows in which it occurs.
 _COUNTED: Mapping[str, Callable[[Statistics], str]] = {
-    "Simulations that failed": lambda s: f"{s.failures} of {s.simulations}" if s.failures else "",
-    "Replies from the cache, whose tokens and cost are not counted": lambda s: str(s.kept or ""),
+    "Simulations that failed": lambda s: (
+        f"{s.spent.failed} of {s.spent.simulations}" if s.spent.failed else ""
+    ),
+    "Replies from the cache, whose tokens and cost are not counted": lambda s: str(s.spent.kept or ""),
     "Runs that began with known inputs": lambda s: f"{s.known} of {s.runs}" if s.known else "",
     "Runs that repeat the seed of another, so intervals are too narrow": lambda s: str(s.repeated or ""),
     "Different ranges, options or context files, counted together": lambda s: (
@@ -282,6 +284,10 @@ _COUNTED: Mapping[str, Callable[[Statistics], str]] = {
 
 def _number(value: float | None, decimals: int) -> str:
     return NONE if value is None else f"{value:.{decimals}f}"
+
+
+def _per_run(found: Statistics, total: float, decimals: int) -> str:
+    return _number(total / found.runs if found.runs else None, decimals)
 
 
 def _interval(interval: Interval | None, decimals: int) -> str:

@@ -1,7 +1,6 @@
 """``falsifier assess`` and ``falsifier margin``: what a search that found nothing says."""
 
 from contextlib import closing
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from falsifier.problem.source import Target
 from falsifier.record import manifest
 from falsifier.record.journal import holds_run, read_journal, recorded_evaluations
 from falsifier.record.questions import doubtful_confirmations
+from falsifier.search.make_engines import LLM_ENGINES
 from falsifier.views.terminal import warn
 from falsifier.views.text import assurance_json
 
@@ -58,7 +58,7 @@ def assess(
     problem, search = _loaded(given, requirement)
     with closing(problem.model):
         found = assess_problem(problem, budget=budget, seed=seed, progress=said, **search)
-    content = assurance_json(found) | {"budget": budget, "seed": seed}
+    content = assurance_json(found)
     lines = [f"{problem.name}: {problem.requirement.formula}"]
     lines += [f"  {line}" for line in found.text.splitlines()]
     code = INTERRUPTED if found.interrupted else 1 if found.violations else 0
@@ -69,13 +69,21 @@ def assess(
 @options.problem_options
 @options.stl_option("Formula or template with {limit} in place of a threshold.", required=True)
 @click.option("--between", required=True, metavar="LOW:HIGH", help="Smallest and largest threshold.")
-@click.option("--engine", metavar="NAME", default=DEFAULT_ENGINE, show_default=True, help="Search engine.")
+@options.engine_option(without=LLM_ENGINES)
 @options.budget_option(least=20, note=" of all searches together")
 @options.seed_option()
 @options.quiet_option
 @options.json_option
 def margin(
-    *, stl: str, between: str, engine: str, budget: int, seed: int, quiet: bool, as_json: bool, **given: Any
+    *,
+    stl: str,
+    between: str,
+    engine: str | None,
+    budget: int,
+    seed: int,
+    quiet: bool,
+    as_json: bool,
+    **given: Any,
 ) -> None:
     """Find the threshold at which a search starts to find violations.
 
@@ -97,10 +105,20 @@ def margin(
 
     problem = load_source(options.problem_source(given | requirement))
     with closing(problem.model):
-        found = find_margin(problem, stl, (low, high), engine=engine, budget=budget, seed=seed, searched=said)
-    content = {"stl": stl, "between": [low, high], **asdict(found)}
+        how: dict[str, Any] = {"engine": engine or DEFAULT_ENGINE, "budget": budget, "seed": seed}
+        found = find_margin(problem, stl, (low, high), **how, searched=said)
+    content = {
+        "formula": stl,
+        "between": [low, high],
+        "falsified_at": found.falsified_at,
+        "unfalsified_at": found.unfalsified_at,
+        "searches": [{"threshold": at, "falsified": falsified} for at, falsified in found.searches],
+        "complete": found.complete,
+        "interrupted": found.interrupted,
+        "spent": {"simulations": found.simulations},
+    }
     text = as_shown(one_line(f"{stl}: {found.text}"), content, as_json=as_json)
-    conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified is None else 1)
+    conclude(text, INTERRUPTED if found.interrupted else 0 if found.falsified_at is None else 1)
 
 
 def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, dict[str, Any]]:

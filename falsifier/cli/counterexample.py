@@ -1,6 +1,6 @@
 """``falsifier explain``, ``replay``, ``export``: on a counterexample, or the nearest miss of a run."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict
 from functools import partial
@@ -30,7 +30,7 @@ from falsifier.problem.joining import rights_notes
 from falsifier.problem.problem import Problem
 from falsifier.stl.margins import signed
 from falsifier.views.terminal import warn
-from falsifier.views.text import broken_facts, evaluation_json, fact_lines
+from falsifier.views.text import broken_facts, confirmation_json, evaluation_json, fact_lines, problem_json
 
 if TYPE_CHECKING:
     from falsifier.core.model import Interface
@@ -101,7 +101,7 @@ def explain(
     else:
         lines, content = _explain(case, run, rights)
     only_drawn = shrunk and all(name.endswith(".png") for name in content["files"])
-    is_lost = only_drawn or (mapped and content["picture"] is None)  # what was to be written
+    is_lost = only_drawn or (mapped and not content["files"])  # what was to be written
     code = INTERRUPTED if content.get("interrupted") else FAILED if is_lost else 0
     conclude(as_shown("\n".join(lines), content, as_json=as_json), code)
 
@@ -127,11 +127,9 @@ def replay(*, run: Path, interface: "Interface | None", as_json: bool, **rights:
         judged = problem if interface in (None, own) else other_interface(problem)
         replayed = replay_stored(case.stored, judged)
         judged.model.close()
-    content = {
-        "status": replayed.status,
-        "robustness": replayed.evaluation and replayed.evaluation.robustness,
-        "text": replayed.text,
-    }
+    assert replayed.evaluation is not None, "it fits: it is admitted"
+    judgement = confirmation_json(replayed.evaluation, replayed.confirmation)
+    content = _content(case, judged, judgement) | {"text": replayed.text}
     conclude(as_shown(replayed.text, content, as_json=as_json), 1 if replayed.status == "violates" else 0)
 
 
@@ -211,15 +209,10 @@ def _shrink(
             if found.trajectory is not None:  # for reports, which simulate nothing
                 files.saved(file.with_suffix(".npz"), found.trajectory.save)
         paths += files.draw_evaluation(problem, found, file.with_suffix(".png"))
-    content = {
-        "violated": found.violated,
-        "outcome": confirmation and confirmation.outcome,
-        "reason": confirmation and confirmation.reason,
-        **evaluation_json(found),
+    content = _content(case, problem, confirmation_json(found, confirmation), paths) | {
         "minimal": shrunk.minimal,
-        "simulations": shrunk.simulations,
         "at_most": shrunk.at_most,
-        "files": list(map(str, paths)),
+        "spent": {"simulations": shrunk.simulations},
     }
     lines = [case.text] if case.is_miss else []
     end = "nothing simpler found nearby" if shrunk.minimal else "the budget is used up"
@@ -251,12 +244,9 @@ def _explain(case: Case, run: Path, rights: Mapping[str, Any]) -> Told:
         about = "\n".join([*case.changes(problem), explanation.text])  # reports repeat it
     with suppress(OSError):  # it is printed anyway
         write_whole(beside(case.file, EXPLANATION), f"{about}\n")
-    content = {
-        "violated": explanation.violated,
+    content = _content(case, problem, evaluation_json(evaluation), pictures) | {
         "text": explanation.text,
         "effects": [asdict(effect) for effect in explanation.effects],
-        "about": str(case.place),
-        "picture": next(map(str, pictures), None),
     }
     drawn = [f"picture: {picture}" for picture in pictures]
     return [*_about(case, problem, run), explanation.text, *drawn], content
@@ -268,20 +258,26 @@ def _map(case: Case, run: Path, rights: Mapping[str, Any], budget: int, out: Pat
 
     picture = beside(case.file, "robustness-map.png") if out is None else files.checked_picture(out)
     with _loaded(case, rights) as problem:
-        found = robustness_map(problem, case.simulated(problem), budget=budget)
+        evaluation = case.simulated(problem)
+        found = robustness_map(problem, evaluation, budget=budget)
     drawn = files.draw(lambda: plot_robustness_map(found, problem.name), picture)
     labels = (coordinate.label for coordinate in found.coordinates)
-    content = {
-        "original": found.original,
-        "smallest": found.smallest,
+    content = _content(case, problem, evaluation_json(evaluation), drawn) | {
+        "smallest_robustness": found.smallest,
         "interrupted": found.interrupted,
         "persistence": [{"size": size, "share": share} for size, share in found.persistence],
         "rank_correlations": dict(zip(labels, found.influences, strict=True)),
-        "about": str(case.place),
-        "picture": next(map(str, drawn), None),
     }
     told = [f"{problem.name}: {found.text}", *(f"  picture        {file}" for file in drawn)]
     return [*_about(case, problem, run), *told], content
+
+
+def _content(
+    case: Case, problem: Problem, simulated: Mapping[str, Any], written: Iterable[Path] = ()
+) -> dict[str, Any]:
+    """Return what the JSON of all these commands has: what it is about, and one evaluation."""
+    about = {"about": str(case.place), **problem_json(problem)}
+    return {**about, **simulated, "files": list(map(str, written))}
 
 
 def _about(case: Case, problem: Problem, named: Path) -> list[str]:

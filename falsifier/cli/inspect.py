@@ -59,8 +59,9 @@ def info(*, fmu: Path, everything: bool, checked: bool, as_json: bool, **options
         diagram = read_diagram(fmu)
         say(as_shown(simulink_text(diagram), as_json and asdict(diagram), as_json=as_json))
         return
-    if checked and as_json:
-        refuse("the comparison is printed as text only; drop one of them", check=True, json=True)
+    if as_json and (everything or checked):
+        said = "JSON shows all variables anyway" if everything else "the comparison is printed as text only"
+        refuse(f"{said}; drop one of them", all=everything, check=checked, json=True)
     source, changes = _named(fmu), changes_in(options)
     found = read_info(source) if isinstance(source, Path) else source.info
     spec = _spec_of(fmu)

@@ -88,7 +88,7 @@ def prompt(
         doubtful=doubtful_confirmations(problem, records, evaluations),
         lessons=_lessons(records),
     )
-    sent = [{"role": message.role, "content": message.content} for message in messages]
+    sent = {"messages": [{"role": message.role, "content": message.content} for message in messages]}
     say(as_shown(_as_text(messages), sent, as_json=as_json))
 
 

@@ -5,7 +5,7 @@ or add a remark, a function makes the option.
 """
 
 import logging
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -225,12 +225,14 @@ def problem_source(options: dict[str, Any]) -> "ProblemSource":
     return source
 
 
-def engine_option(*, multiple: bool = False) -> Decorator:
+def engine_option(*, multiple: bool = False, without: Collection[str] = ()) -> Decorator:
+    """Option --engine; ``without``: the engines that ask a language model, of a command that asks none."""
+    names = ", ".join(name for name in ENGINES if name not in without)
+    asked = "" if without else ", or the language model if --llm is given"
     return option(
         "--engine",
         "engine",
-        f"Search engine: {', '.join(ENGINES)}. Default: {DEFAULT_ENGINE}, or the language model if --llm is "
-        "given.",
+        f"Search engine: {names}. Default: {DEFAULT_ENGINE}{asked}.",
         multiple=multiple,
         metavar="NAME",
     )
@@ -306,7 +308,7 @@ total_option = click.option(
 )
 
 
-def count_option(flag: str, text: str, *, default: int = 1, least: int = 1) -> Decorator:
+def count_option(flag: str, text: str, *, default: int | None = 1, least: int = 1) -> Decorator:
     return click.option(flag, type=click.IntRange(least), default=default, show_default=True, help=text)
 
 
@@ -314,8 +316,8 @@ def seed_option(text: str = "Random seed.") -> Decorator:
     return count_option("--seed", text, default=0, least=0)
 
 
-def jobs_option(what: str) -> Decorator:
-    return count_option("--jobs", f"Number of {what} at a time on this machine.")
+def jobs_option(what: str, *, default: int | None = 1) -> Decorator:
+    return count_option("--jobs", f"Number of {what} at a time on this machine.", default=default)
 
 
 def inputs_option(text: str, *, multiple: bool = False) -> Decorator:

@@ -95,7 +95,7 @@ def coverage(*, directory: Path, out: Path | None, as_json: bool) -> None:
     name = ", ".join(names)
     drawn = files.draw(lambda: plot_coverage(found, name), picture)
     text = "\n".join([coverage_text(found, name), *(f"picture: {file}" for file in drawn)])
-    content = {"requirements": names, **coverage_json(found), "picture": next(map(str, drawn), None)}
+    content = {"requirements": names, **coverage_json(found), "files": list(map(str, drawn))}
     conclude(as_shown(text, content, as_json=as_json), FAILED if out and not drawn else 0)
 
 

@@ -76,7 +76,7 @@ def _problem_line(problem: Problem) -> str:
 
 def _lines(finding: LintFinding) -> list[str]:
     head = f"{finding.requirement}: {finding.kind}: {one_line(finding.text)}"
-    place = [f"  in      {finding.place}"] if finding.place else []
+    place = [f"  in      {finding.part}"] if finding.part else []
     return [head, *place, f"  to do   {finding.advice}"]
 
 

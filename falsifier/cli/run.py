@@ -118,20 +118,26 @@ def run(
 
 @command()
 @options.directory_argument
-@options.jobs_option("runs")
+@options.jobs_option("runs", default=None)
 @options.budget_option(None, note=", including those already done")
 @options.total_option
 @options.quiet_option
 @options.json_option
 def resume(
-    *, directory: Path, jobs: int, budget: int | None, totals: "Budget | None", quiet: bool, as_json: bool
+    *,
+    directory: Path,
+    jobs: int | None,
+    budget: int | None,
+    totals: "Budget | None",
+    quiet: bool,
+    as_json: bool,
 ) -> None:
     """Continue the run or campaign in DIRECTORY.
 
     No recorded question is asked again, and no recorded simulation is repeated unless its trajectory is
     needed and was not kept. A run keeps its limits; only --budget replaces the limit on simulations, even
-    if the run has ended. --jobs and --total apply to campaigns only. Totals of simulations, tokens and cost
-    include what was spent before.
+    if the run has ended. --jobs, by default 1, and --total apply to campaigns only. Totals of simulations,
+    tokens and cost include what was spent before.
     """
     from falsifier.campaigns import resume_campaign
     from falsifier.campaigns.directory import is_campaign
@@ -145,13 +151,13 @@ def resume(
             "the runs of a campaign keep their limit; --total simulations=N limits all of them", budget=budget
         )
         with campaign_display(quiet=quiet) as show:
-            outcome = resume_campaign(directory, jobs=jobs, limits=totals, listeners=[show])
+            outcome = resume_campaign(directory, jobs=jobs or 1, limits=totals, listeners=[show])
         finish(directory, outcome, table="main", as_json=as_json)
     places = runs_in(directory)
     refuse(
         f"applies to campaigns only; the run {directory} keeps its number of jobs and its limits, except "
         "--budget",
-        jobs=jobs > 1,
+        jobs=jobs,
         total=totals,
     )
     results: list[Result] = []

@@ -29,7 +29,7 @@ from falsifier.problem.problem import Problem
 from falsifier.problem.ranges import value_kind
 from falsifier.problem.source import ProblemSource
 from falsifier.views.terminal import warn
-from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines
+from falsifier.views.text import evaluation_facts, evaluation_json, fact_lines, problem_json
 
 # What --out is to hold.
 _FILES = ("trajectory.csv", "input.csv", "trajectory.png")
@@ -97,9 +97,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         *([f"  files          {', '.join(map(str, files))}"] if files else []),
     ]
     content = {
-        "requirement": problem.name,
-        "formula": str(problem.requirement.formula),
-        "violated": evaluation.violated,
+        **problem_json(problem),
         **evaluation_json(evaluation),
         "files": list(map(str, files)),
     }

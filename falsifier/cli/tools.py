@@ -128,20 +128,20 @@ def validate(*, file: Path, budget: int, as_json: bool) -> None:
     Exit codes: 0 all accepted, 1 some rejected, 2 wrong usage or file.
     """
     findings = check_rows(read_rows(file), budget=budget)
-    accepted = f"{sum(f.holds for f in findings)} of {counted(len(findings), 'counterexample')} accepted"
+    accepted = f"{sum(f.accepted for f in findings)} of {counted(len(findings), 'counterexample')} accepted"
     text = "\n".join([*map(_finding_line, findings), accepted])
     content = [
         {
             "row": f.row.number,
             "requirement": f.row.requirement,
-            "holds": f.holds,
+            "accepted": f.accepted,
             "robustness": f.robustness,
             "claimed": f.row.robustness,
             "reason": f.reason,
         }
         for f in findings
     ]
-    conclude(as_shown(text, content, as_json=as_json), 0 if all(f.holds for f in findings) else 1)
+    conclude(as_shown(text, content, as_json=as_json), 0 if all(f.accepted for f in findings) else 1)
 
 
 def _finding_line(f: Revalidated) -> str:

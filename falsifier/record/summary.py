@@ -111,7 +111,7 @@ class Summary:
         failed = all(v is None for v in judged.values())
         if failed:
             self._failed[record.index] = record.reason
-        self.spent += Spent(simulations=1, simulation_seconds=record.seconds, failures=int(failed))
+        self.spent += Spent(simulations=1, simulation_seconds=record.seconds, failed=int(failed))
 
 
 S = TypeVar("S", bound=Summary)

@@ -38,7 +38,7 @@ class Spent:
 
     Attributes:
         simulations: number of simulated candidates, including failed simulations.
-        failures: number of simulations among them that failed, crashed or timed out.
+        failed: number of simulations among them that failed, crashed or timed out.
         seconds: wall-clock time of the run.
         simulation_seconds: time inside the simulator.
         engine_seconds: time inside the engine, including the language model.
@@ -60,20 +60,20 @@ class Spent:
     completion_tokens: int = 0
     reasoning_tokens: int = 0
     cost: float | None = 0.0
-    failures: int = 0
+    failed: int = 0
     without_reply: int = 0
     kept: int = 0
 
     @property
     def has_mostly_failed(self) -> bool:
         """Whether more than half of the simulations failed, so that little was searched."""
-        return 2 * self.failures > self.simulations
+        return 2 * self.failed > self.simulations
 
     @property
     def simulations_text(self) -> str:
         """Number of simulations in words, with those that failed."""
-        failed = f", {self.failures} of them failed" if self.failures else ""
-        failed = ", which failed" if self.failures == self.simulations == 1 else failed
+        failed = f", {self.failed} of them failed" if self.failed else ""
+        failed = ", which failed" if self.failed == self.simulations == 1 else failed
         return counted(self.simulations, "simulation") + failed
 
     @property

@@ -39,7 +39,7 @@ class Finding:
         part: the part of the formula, or the input or parameter, that it is about; empty if it is about none.
         margin: how far the part was from changing its truth; None if that has no meaning.
         time: when it came closest, in s; None if that has no meaning.
-        simulation: index of the evaluation in which it came closest; None if that has no meaning.
+        simulation: number, from 1, of the simulation in which it came closest; None if that has no meaning.
     """
 
     kind: FindingKind
@@ -57,7 +57,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """Simulations that failed for the same cause: how many, and reason and index of the first of them."""
+    """Simulations that failed for the same cause: how many, and reason and number, from 1, of the first."""
 
     count: int
     reason: str
@@ -66,7 +66,7 @@ class Failure:
     @property
     def text(self) -> str:
         """The cause, with an example."""
-        which = f"simulation {self.simulation + 1}"
+        which = f"simulation {self.simulation}"
         if self.count == 1:
             return f"{which} failed: {self.reason}"
         return f"{self.count} simulations failed, for example {which}: {self.reason}"
@@ -86,7 +86,7 @@ def failures(reasons: Iterable[tuple[int, str]]) -> tuple[Failure, ...]:
     found: dict[str, Failure] = {}
     for index, reason in reasons:
         cause = cause_of(reason)
-        known = found.get(cause, Failure(0, reason, index))
+        known = found.get(cause, Failure(0, reason, index + 1))
         found[cause] = Failure(known.count + 1, known.reason, known.simulation)
     return tuple(sorted(found.values(), key=lambda failure: -failure.count))
 

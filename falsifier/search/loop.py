@@ -238,11 +238,11 @@ class _Loop:
 
     def all_failed(self) -> bool:
         """Whether every simulation so far has failed."""
-        return 0 < self.count == self.spent.failures
+        return 0 < self.count == self.spent.failed
 
     def failure_text(self) -> str:
         """The reason of a run in which most simulations failed."""
-        failed = f"{self.spent.failures} of {self.count} simulations"
+        failed = f"{self.spent.failed} of {self.count} simulations"
         if self.all_failed():
             failed = "the only simulation" if self.count == 1 else f"all {self.count} simulations"
         return f"{failed} failed; the last error: {self.last_error}"
@@ -287,7 +287,7 @@ class _Loop:
             failed = all(seen.status != "ok" for _, seen in judged)
             self.last_error = evaluation.reason if failed else self.last_error
             self.spent = self.clock() + Spent(
-                simulations=1, simulation_seconds=evaluation.seconds, failures=int(failed)
+                simulations=1, simulation_seconds=evaluation.seconds, failed=int(failed)
             )
             self.emit(
                 events.Evaluated(

@@ -185,7 +185,7 @@ def _untested(kind: FindingKind, seen: _Seen, best: _Extreme, what: str, off: st
         part=str(seen.part),
         margin=margin,
         time=best.time,
-        simulation=best.simulation,
+        simulation=best.simulation + 1,
     )
 
 

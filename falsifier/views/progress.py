@@ -153,10 +153,10 @@ class News:
                 told = []
                 if ended.status != "ok" and self._is_new(f"failed: {cause_of(ended.reason)}"):
                     told.append(f"simulation {event.index + 1} {ended.outcome}")
-                many = spent.failures >= _WARNED_FAILURES and spent.has_mostly_failed
+                many = spent.failed >= _WARNED_FAILURES and spent.has_mostly_failed
                 if many and self._is_new("mostly failed"):
                     told.append(
-                        f"warning: {spent.failures} of {spent.simulations} simulations have failed; the run "
+                        f"warning: {spent.failed} of {spent.simulations} simulations have failed; the run "
                         "counts as failed if more than half do"
                     )
                 if better := self._better(event):

@@ -12,6 +12,7 @@ from falsifier.core.ranges import number_names
 from falsifier.core.words import candidate_facts, counted, in_unit, readable, resolving
 from falsifier.counterexamples.store import file_of
 from falsifier.errors import JournalError
+from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem, held_text
 from falsifier.record import manifest
@@ -123,20 +124,20 @@ def counterexample_name(result: Result) -> str:
 
 def result_json(result: Result) -> dict[str, Any]:
     """Convert a result to a value that can be dumped as one JSON object."""
+    found = result.counterexample
     return {
-        "requirement": result.problem.name,
-        "formula": str(result.problem.requirement.formula),
+        **problem_json(result.problem),
         "status": result.status,
         "reason": result.reason,
-        "counterexample": result.counterexample and evaluation_json(result.counterexample.evaluation),
+        "counterexample": found and confirmation_json(found.evaluation, found),
         "best": result.best and evaluation_json(result.best),
         "parameterization": parameterization_of(result.searched or result.problem.space),
         "findings": [asdict(finding) for finding in result.findings],
         "failures": [asdict(failure) for failure in result.failures],
         "not_searched": [asdict(held) for held in result.problem.held],
-        "fragile": [evaluation_json(c.evaluation) | {"reason": c.reason} for c in result.fragile],
+        "fragile": [confirmation_json(c.evaluation, c) for c in result.fragile],
+        "refuted": [confirmation_json(c.evaluation, c) for c in result.refuted],
         "remarks": list(result.remarks),
-        "not_confirmed": [c.reason for c in result.refuted],
         "spent": asdict(result.spent),
         "directory": result.directory and str(result.directory),
     }
@@ -188,12 +189,24 @@ def broken_lines(verdict: Verdict | None) -> tuple[str, ...]:
     return verdict.breach.lines if verdict is not None and verdict.breach is not None else ()
 
 
+def problem_json(problem: Problem) -> dict[str, Any]:
+    """Return how JSON about a requirement begins."""
+    return {"requirement": problem.name, "formula": str(problem.requirement.formula)}
+
+
+def confirmation_json(evaluation: Evaluation, found: Confirmation | None) -> dict[str, Any]:
+    """Convert an evaluation, and what confirmed it if it is a violation, to a value for JSON."""
+    outcome, reason = (found.outcome, found.reason) if found else (None, None)
+    return {**evaluation_json(evaluation), "outcome": outcome, "reason": reason}
+
+
 def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
     """Convert an evaluation to a value that can be dumped as JSON."""
     verdict = evaluation.verdict
     breach = verdict.breach if verdict else None
     return {
         **evaluation.candidate.to_json(),
+        "violated": evaluation.violated,
         "robustness": evaluation.robustness,
         "critical_time": verdict and verdict.critical_time,
         "predicate": verdict and verdict.predicate,
@@ -205,19 +218,18 @@ def evaluation_json(evaluation: Evaluation) -> dict[str, Any]:
 def assurance_json(found: Assurance) -> dict[str, Any]:
     """Convert what random simulations say to a value that can be dumped as one JSON object."""
     return {
-        "requirement": found.problem.name,
-        "formula": str(found.problem.requirement.formula),
+        **problem_json(found.problem),
         "distribution": found.distribution,
         "confidence": found.confidence,
-        "drawn": found.drawn,
         "violations": found.violations,
         "failures": [asdict(failure) for failure in found.failures],
         "upper_bound": found.bound,
         "interval": found.interval,
-        "smallest": evaluation_json(found.smallest),
-        "searched": found.searched and asdict(found.searched),
+        "best": evaluation_json(found.best),
+        "search": found.searched and asdict(found.searched),
         "findings": [asdict(finding) for finding in found.findings],
         "interrupted": found.interrupted,
+        "spent": {"simulations": found.drawn},
     }
 
 

@@ -36,7 +36,7 @@ def test_violations_are_those_of_draws_that_no_search_with_this_seed_made_with_e
     assert found.interval == (lower_bound(expected, 60, 0.975), upper_bound(expected, 60, 0.975))
     always = replace(found, bound=0.99441, interval=(0.99959, 1.0)).text
     assert "is at most 0.995." in always and "between 0.999 and 1." in always, "rounded, and still bounds"
-    assert found.smallest.robustness == pytest.approx(0.8 - max(drawn))
+    assert found.best.robustness == pytest.approx(0.8 - max(drawn))
 
 
 def test_without_violations_the_bound_and_the_nearest_miss_are_said() -> None:
@@ -110,7 +110,7 @@ def test_what_a_search_found_is_stated_beside_the_bound_and_no_violation_is_of_p
     searched = falsify(system(5.0), "corners", budget=4).evaluations
     found = assess(system(5.0), budget=10, searched=searched)
     assert found.searched is not None
-    assert (found.searched.violation, found.searched.smallest) == (None, 4.0)
+    assert (found.searched.violation, found.searched.smallest_robustness) == (None, 4.0)
     assert "A search of 4 simulations came nearer: its smallest robustness was +4" in found.text
     searched = falsify(system(0.9999), "corners", budget=10).evaluations
     found = assess(system(0.9999), budget=100, searched=searched)

@@ -76,7 +76,7 @@ def test_what_says_nothing_is_found_with_its_place(
 ) -> None:
     wheel = "[parameters.wheel]\nrange = [0, 100]  # where it starts\n"
     found = lint(spec(tmp_path, f"{SPEC}{wheel}[requirements.R]\nformula = '{formula}'\n"))
-    assert [(f.requirement, f.kind, f.place) for f in found] == ([("R", kind, place)] if kind else [])
+    assert [(f.requirement, f.kind, f.part) for f in found] == ([("R", kind, place)] if kind else [])
     assert all(words in f"{f.text} {f.advice}" for f in found)
 
 
@@ -134,7 +134,7 @@ def still(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) 
 
 def test_what_no_input_moves_is_measured_and_says_so() -> None:
     (found,) = unmoved_findings([lag_problem(response=still)], 3)
-    assert (found.kind, found.place) == ("unmoved", "")
+    assert (found.kind, found.part) == ("unmoved", "")
     assert found.text.startswith("measured: 3 random simulations had the same x; the FMU does not declare")
     assert not list(unmoved_findings([lag_problem()], 3))
     assert not list(unmoved_findings([lag_problem(response=still)], 0))

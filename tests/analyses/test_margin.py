@@ -21,19 +21,19 @@ def system() -> Problem:
 )
 def test_the_threshold_is_found_in_either_direction(vary: str, high: float, hardest: float) -> None:
     found = margin(system(), vary, (-3, high), engine="corners", budget=60)
-    assert found.falsified is not None and found.unfalsified is not None
-    assert min(found.falsified, found.unfalsified) <= hardest <= max(found.falsified, found.unfalsified)
-    assert abs(found.unfalsified - found.falsified) <= 0.06 and found.complete
+    assert found.falsified_at is not None and found.unfalsified_at is not None
+    below, above = sorted((found.falsified_at, found.unfalsified_at))
+    assert below <= hardest <= above <= below + 0.06 and found.complete
     assert found.simulations <= 60
     assert "falsified at" in found.text
 
 
 def test_ends_of_the_range_are_said_to_be_so() -> None:
     always = margin(system(), "G[0,10] (x <= {limit})", (-0.9, 0.5), engine="corners", budget=40)
-    assert (always.falsified, always.unfalsified) == (0.5, None)
+    assert (always.falsified_at, always.unfalsified_at) == (0.5, None)
     assert "in the whole range, even at 0.5" in always.text
     nothing = margin(system(), "G[0,10] (x <= {limit})", (1.5, 3), engine="corners", budget=40)
-    assert (nothing.falsified, nothing.unfalsified) == (None, 1.5)
+    assert (nothing.falsified_at, nothing.unfalsified_at) == (None, 1.5)
     assert "not even at 1.5" in nothing.text
     assert nothing.simulations == 40  # what is left is spent at the easy end before this is said
 
@@ -41,16 +41,16 @@ def test_ends_of_the_range_are_said_to_be_so() -> None:
 def test_a_threshold_that_decides_nothing_here_is_searched_all_the_same() -> None:
     implied = "(G[0,10] (u >= 2)) -> (G[0,10] (x <= {limit}))"
     found = margin(lag_problem(), implied, (0, 3), engine="corners", budget=20)
-    assert (found.falsified, found.unfalsified, found.simulations) == (None, 0, 20)
+    assert (found.falsified_at, found.unfalsified_at, found.simulations) == (None, 0, 20)
 
 
 def test_thresholds_are_exactly_those_that_are_shown() -> None:
     found = margin(system(), "G[0,10] (x <= {limit})", (-3, 3), engine="uniform", budget=60)
-    assert found.falsified is not None and found.unfalsified is not None
-    for threshold in (found.falsified, found.unfalsified):
+    assert found.falsified_at is not None and found.unfalsified_at is not None
+    for threshold in (found.falsified_at, found.unfalsified_at):
         assert f" at {threshold:.4f}".rstrip("0") in found.text
         assert threshold == round(threshold, 4)
-    assert found.falsified < 1 and found.falsified < found.unfalsified
+    assert found.falsified_at < 1 and found.falsified_at < found.unfalsified_at
 
 
 def test_what_was_searched_in_vain_is_not_named_after_another_search_has_reached_it() -> None:
@@ -58,16 +58,16 @@ def test_what_was_searched_in_vain_is_not_named_after_another_search_has_reached
         return margin(system(), "G[0,10] (x <= {limit})", (0.5, 0.9), engine="uniform", budget=20, seed=seed)
 
     found = [at(seed) for seed in range(12)]
-    overtaken = [f for f in found if f.searches[0] == (0.9, False) and f.falsified == 0.9]
-    assert overtaken and all(f.unfalsified is None for f in overtaken)
+    overtaken = [f for f in found if f.searches[0] == (0.9, False) and f.falsified_at == 0.9]
+    assert overtaken and all(f.unfalsified_at is None for f in overtaken)
 
 
 def test_thresholds_in_windows_fit_the_time_grid() -> None:
     problem = lag_problem()
     found = margin(problem, "G[0,{limit}] (x <= 0.5)", (0.1, 8), engine="corners", budget=40)
-    assert found.falsified is not None and found.unfalsified is not None
-    assert found.unfalsified < found.falsified
-    for threshold in (found.falsified, found.unfalsified):
+    assert found.falsified_at is not None and found.unfalsified_at is not None
+    assert found.unfalsified_at < found.falsified_at
+    for threshold in (found.falsified_at, found.unfalsified_at):
         steps = threshold / problem.experiment.output_interval
         assert steps == pytest.approx(round(steps))
 
@@ -76,7 +76,7 @@ def test_templates_are_taken_like_formulas() -> None:
     found = margin(
         system(), "stays_within signal=x low=-3 high={limit}", (-3, 3), engine="corners", budget=60
     )
-    assert found.falsified is not None and found.falsified <= 1.0
+    assert found.falsified_at is not None and found.falsified_at <= 1.0
 
 
 def test_what_is_simulated_already_is_judged_for_other_thresholds() -> None:
@@ -126,8 +126,8 @@ def test_what_is_known_when_the_user_stops_is_the_answer() -> None:
         lag_problem(), "G[0,10] (x <= {limit})", (0.0, 3.0), engine="corners", budget=60, searched=stop
     )
     assert found.interrupted and not found.complete
-    assert found.unfalsified is not None and found.falsified is not None
-    assert found.falsified < 1.0 < found.unfalsified
+    assert found.unfalsified_at is not None and found.falsified_at is not None
+    assert found.falsified_at < 1.0 < found.unfalsified_at
     assert found.text.endswith("stopped by the user")
 
 
@@ -142,4 +142,4 @@ def test_what_a_stopped_search_has_simulated_counts(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("falsifier.analyses.margin.search", stopped)
     found = margin(lag_problem(), "G[0,10] (x <= {limit})", (0.0, 3.0), engine="corners", budget=60)
     assert (found.interrupted, found.searches, found.simulations) == (True, (), 6)
-    assert found.falsified is not None and 0.0 < found.falsified < 1.0
+    assert found.falsified_at is not None and 0.0 < found.falsified_at < 1.0

@@ -41,7 +41,7 @@ def test_what_is_exported_holds_when_it_is_simulated_again(campaign: Path, tmp_p
     assert [c["falsified"] for c in cells] == ["yes", "yes", "no", "no"] * 2
     assert {c["input"] for c in cells if c["falsified"] == "no"} == {"[]"}
     findings = validate(read_rows(path))
-    assert [f.holds for f in findings] == [True] * 4
+    assert [f.accepted for f in findings] == [True] * 4
     for finding in findings:
         assert finding.robustness == pytest.approx(finding.row.robustness, abs=1e-6)
         assert np.diff(finding.row.input[:, 0]) == pytest.approx(0.05)
@@ -65,7 +65,7 @@ def test_what_is_exported_holds_when_it_is_simulated_again(campaign: Path, tmp_p
 )
 def test_claims_are_judged_by_the_rules(tmp_path: Path, line: str, holds: bool, reason: str) -> None:
     (finding,) = validate(read_rows(rows(tmp_path, line)))
-    assert finding.holds == holds and reason in finding.reason
+    assert finding.accepted == holds and reason in finding.reason
 
 
 @pytest.mark.usefixtures("small")
@@ -82,7 +82,7 @@ def test_coarse_inputs_are_piecewise_constant_and_dense_ones_are_as_given(tmp_pa
 
 def test_unknown_requirements_are_findings_without_the_list_of_all(tmp_path: Path) -> None:
     (finding,) = validate(read_rows(rows(tmp_path, 'SB,SB1,2,"[0 1]",[],yes,3,1,1,-0.4,10')))
-    assert not finding.holds
+    assert not finding.accepted
     assert "no bundled requirement 'SB1'" in finding.reason and "AT1" not in finding.reason
 
 

@@ -19,16 +19,16 @@ def test_statistics_are_over_the_falsified_runs(campaign: Path) -> None:
     runs = [run for run in load(campaign) if run.requirement == "HARD" and run.method.engine == "uniform"]
     found = statistics(runs)
     counts = [run.simulations for run in runs if run.falsified]
-    assert (found.runs, found.falsified) == (2, len(counts)) == (2, 2)
+    assert (found.runs, found.falsified_runs) == (2, len(counts)) == (2, 2)
     assert found.mean == np.mean(counts) and found.median == np.median(counts)
     assert found.deviation == pytest.approx(np.std(counts, ddof=1))
-    assert found.cost == 0
-    assert found.best == min(run.verdict.robustness for run in runs if run.verdict)
+    assert found.spent.cost == 0
+    assert found.smallest_robustness == min(run.verdict.robustness for run in runs if run.verdict)
 
 
 def test_without_a_falsified_run_there_is_no_mean(campaign: Path) -> None:
     found = statistics(run for run in load(campaign) if run.requirement == "NEVER")
-    assert (found.runs, found.falsified) == (4, 0)
+    assert (found.runs, found.falsified_runs) == (4, 0)
     assert (found.mean, found.median, found.deviation, found.mean_interval) == (None, None, None, None)
     assert found.rate_interval is None, "four runs are too few for an interval"
 

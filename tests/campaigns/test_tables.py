@@ -96,7 +96,7 @@ def test_unfinished_runs_are_counted_apart_but_not_those_that_spent_their_budget
     assert any(note.startswith("+n") for note in table.notes)
     alone = main_table([replace(first, status="interrupted")], PUBLISHED)
     assert dict(zip(alone.header, alone.rows[0], strict=True))["cost $"] == "–", "an unknown cost is not zero"
-    mostly = replace(first, status="failed", spent=replace(first.spent, failures=15, kept=7))
+    mostly = replace(first, status="failed", spent=replace(first.spent, failed=15, kept=7))
     table = main_table([mostly, *others], PUBLISHED)
     assert table.rows[0][2] == "0/2"
     assert "Simulations that failed: NEVER uniform 15 of 40." in table.notes
@@ -134,4 +134,4 @@ def test_formats_carry_the_same_cells(runs: list[Run]) -> None:
     assert "| HARD | uniform | 2/2 |" in table.markdown()
     assert table.text().splitlines()[4].split()[:3] == ["HARD", "uniform", "2/2"]
     first = json.loads(statistics_json(runs))[0]
-    assert (first["requirement"], first["label"], first["falsified"]) == ("HARD", "uniform", 2)
+    assert (first["requirement"], first["label"], first["falsified_runs"]) == ("HARD", "uniform", 2)

@@ -10,7 +10,7 @@ def test_a_system_without_violations_gets_a_bound(tmp_path: Path) -> None:
     for part in ("NEVER: ", "0 of 60 random simulations", "at most 0.0488"):
         assert part in done.out
     found = falsifier("assess", NEVER, "--budget", "60", "--json", cwd=tmp_path).json
-    assert (found["drawn"], found["violations"], found["findings"]) == (60, 0, [])
+    assert (found["spent"], found["violations"], found["findings"]) == ({"simulations": 60}, 0, [])
 
 
 def test_violations_are_counted_and_decide_the_exit_code(tmp_path: Path) -> None:
@@ -23,7 +23,8 @@ def test_violations_are_counted_and_decide_the_exit_code(tmp_path: Path) -> None
 def test_the_threshold_is_printed_between_two_values(tmp_path: Path) -> None:
     vary = ["--stl", "G[0,10] (x <= {limit})", "--between", "0:3", "--engine", "corners"]
     done = falsifier("margin", NEVER, *vary, "--budget", "40", "--json", cwd=tmp_path, code=1)
-    assert 0.95 < done.json["falsified"] < done.json["unfalsified"] < 1.05
+    assert 0.95 < done.json["falsified_at"] < done.json["unfalsified_at"] < 1.05
+    assert done.json["searches"][0] == {"threshold": 3.0, "falsified": False}
     assert "3: not falsified" in done.err
 
 
@@ -42,8 +43,9 @@ def test_a_range_that_is_none_is_refused(tmp_path: Path) -> None:
 def test_a_run_is_assessed_in_its_own_space_beside_what_it_found(tmp_path: Path) -> None:
     falsifier("run", NEVER, "--engine", "corners", "--budget", "5", "--out", "r", "--quiet", cwd=tmp_path)
     done = falsifier("assess", "r", "--budget", "20", "--json", cwd=tmp_path, code=0)
-    assert done.json["requirement"] == "NEVER" and done.json["drawn"] == 20
-    assert done.json["searched"]["simulations"] == 5 and 0.99 < done.json["searched"]["smallest"] < 1.01
+    assert done.json["requirement"] == "NEVER" and done.json["spent"]["simulations"] == 20
+    search = done.json["search"]
+    assert search["simulations"] == 5 and 0.99 < search["smallest_robustness"] < 1.01
     assert "drop --stl" in falsifier("assess", "r", "--stl", "x <= 1", cwd=tmp_path, code=2).err
     falsify("python:tests.stepped:euler_problem", "corners", budget=2, directory=tmp_path / "fragile")
     refused = falsifier("assess", NEVER, "--parameterization", "free:2", cwd=tmp_path)

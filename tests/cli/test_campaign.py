@@ -23,7 +23,7 @@ def test_bench_prints_and_saves_the_tables(command: Any, tmp_path: Path) -> None
     assert (tmp_path / "c" / "table-main.csv").read_text().startswith("requirement,method,FR")
     assert not (tmp_path / "c" / "table-ablation.md").exists()
     rows = json.loads((tmp_path / "c" / "table.json").read_text())
-    assert [(row["requirement"], row["falsified"]) for row in rows] == [("HARD", 2), ("NEVER", 0)]
+    assert [(row["requirement"], row["falsified_runs"]) for row in rows] == [("HARD", 2), ("NEVER", 0)]
     alone = json.loads(bench(command, "--json", "--quiet").stdout)
     assert [row["label"] for row in alone] == ["uniform", "uniform"]
 
@@ -75,7 +75,7 @@ def test_a_stopped_campaign_says_how_to_go_on_and_a_complete_one_is_not_stopped(
     command("resume", "c", "--total", "simulations=1000", "--quiet", code=0)
     assert "to continue" not in command("resume", "c", "--total", "simulations=5", "--quiet", code=0).stderr
     rows = json.loads((tmp_path / "c" / "table.json").read_text())
-    assert [(row["requirement"], row["falsified"]) for row in rows] == [("HARD", 2), ("NEVER", 0)]
+    assert [(row["requirement"], row["falsified_runs"]) for row in rows] == [("HARD", 2), ("NEVER", 0)]
 
 
 @pytest.fixture

@@ -11,6 +11,7 @@ import pytest
 from falsifier.cli import cli
 from falsifier.cli.command import Command, option_groups
 from falsifier.core.files import bundled
+from falsifier.engines import ENGINES
 from tests.command import ROOT, commands, falsifier
 
 
@@ -167,6 +168,14 @@ def test_what_several_commands_have_is_below_a_heading_of_help() -> None:
     names = Counter(row[0].split()[0] for groups in helps for _, rows in groups for row in rows)
     own = [row[0].split()[0] for first, *more in helps for row in first[1] if more and first[0] == "Options"]
     assert own and not [name for name in own if names[name] > 1]
+
+
+def test_the_engines_are_listed_in_every_command_that_takes_one() -> None:
+    found = dict(commands(cli))
+    for name in ("run", "bench", "margin"):
+        (option,) = (p for p in found[name].params if isinstance(p, click.Option) and "--engine" in p.opts)
+        listed = [*ENGINES] if name != "margin" else [e for e in ENGINES if e != "hybrid"]
+        assert f"Search engine: {', '.join(listed)}. Default: surrogate" in (option.help or "")
 
 
 def test_options_are_few_and_mean_the_same_everywhere() -> None:

@@ -59,7 +59,19 @@ def test_at1_shrinks_to_full_throttle_and_no_brake(folder: Path) -> None:
     kept = run(folder, "export", "run/shrunk.json", "--store", "kept", code=0)
     assert kept.out.startswith("kept/AT/AT1/") and kept.out.count("\n") == 1
     assert (folder / "run" / "counterexample.json").exists()
-    assert run(folder, "replay", kept.out.strip()).code == 1
+    again = run(folder, "replay", kept.out.strip(), "--json", code=1).json
+    of_both = [
+        "requirement",
+        "formula",
+        "signals",
+        "violated",
+        "robustness",
+        "predicate",
+        "breach",
+        "outcome",
+    ]
+    assert [again[key] for key in of_both] == [done.json[key] for key in of_both]
+    assert again["about"] == kept.out.strip() and done.json["spent"]["simulations"] > 0
 
 
 def test_explain_names_what_it_takes(folder: Path) -> None:
@@ -113,7 +125,7 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
     assert shares[-1] < 1.0
     assert set(done.json["rank_correlations"]) == {"throttle [%]", "brake [ft.lbf]"}
     # What violates is red, what holds blue.
-    assert {OUTPUT, CRITICAL} <= colours(folder / done.json["picture"])
+    assert {OUTPUT, CRITICAL} <= colours(folder / done.json["files"][0])
 
 
 @pytest.mark.parametrize(

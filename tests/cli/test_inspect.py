@@ -103,6 +103,8 @@ def test_info_of_a_simulink_file(tmp_path: Path) -> None:
     assert falsifier("info", "limphome.slx", "--check", cwd=tmp_path).code == 2
     refused = falsifier("info", "AT", "--check", "--json", cwd=tmp_path, code=2)
     assert "--check, --json: the comparison is printed as text only; drop one of them" in refused.err
+    refused = falsifier("info", "AT", "--all", "--json", cwd=tmp_path, code=2)
+    assert "--all, --json: JSON shows all variables anyway; drop one of them" in refused.err
     (tmp_path / "bad.slx").write_bytes(b"PK")
     assert "bad.slx: not a readable Simulink file" in falsifier("info", "bad.slx", cwd=tmp_path, code=2).err
 

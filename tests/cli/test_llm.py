@@ -21,7 +21,7 @@ def test_the_printed_prompt_is_what_is_sent(tmp_path: Path) -> None:
     with serving(reply(FULL)) as server:
         falsifier(*at1(server.url), cwd=tmp_path, env=ENV)
         sent = server.received[0].body["messages"]
-    assert json.loads(printed.out) == sent
+    assert printed.json == {"messages": sent}
 
 
 def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:

@@ -80,4 +80,4 @@ def test_what_a_run_tried_is_printed_and_drawn(tmp_path: Path) -> None:
     told = falsifier("coverage", "r", "--json", "--out", "c.png", cwd=tmp_path).json
     assert told["requirements"] == ["NEVER"]
     assert told["simulations"] == 4
-    assert told["picture"] == "c.png" and (tmp_path / "c.png").exists()
+    assert told["files"] == ["c.png"] and (tmp_path / "c.png").exists()

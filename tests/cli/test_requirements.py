@@ -19,7 +19,7 @@ def test_check_prints_requirement_place_and_what_to_do(tmp_path: Path) -> None:
     assert "  in      G[0,20] (throttle <= 100)" in done.out
     assert "  to do   check threshold" in done.out
     found = falsifier("check", "my.toml", "--json", cwd=tmp_path, code=1)
-    assert [f["kind"] for f in found.json] == ["always"]  # type: ignore[index]
+    assert [(f["kind"], f["part"]) for f in found.json] == [("always", "G[0,20] (throttle <= 100)")]  # type: ignore[index]
 
 
 def test_check_says_what_is_searched(tmp_path: Path) -> None:

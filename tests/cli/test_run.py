@@ -196,7 +196,7 @@ def test_a_folder_of_runs_is_told_from_one_of_them(tmp_path: Path) -> None:
         assert "campaign is a folder of runs; give one of them: campaign/runs/A, camp" in refused.err
         assert refused.err.strip().endswith("campaign/runs/C and 1 more")
     assert falsifier("resume", "runs", "--budget", "2", "--quiet", cwd=work).code == 0
-    for option in (("--total", "simulations=8"), ("--jobs", "2")):
+    for option in (("--total", "simulations=8"), ("--jobs", "1")):
         assert "applies to campaigns only" in falsifier("resume", "runs/A", *option, cwd=work, code=2).err
     falsify("AT1", "corners", budget=1, directory=work / "other")
     shutil.copytree(work / "runs" / "A", work / "A")

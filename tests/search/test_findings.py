@@ -30,7 +30,7 @@ def test_failures_that_differ_only_in_numbers_have_one_cause() -> None:
         (6, "m: car3 diverged at 0x7f02"),
     ]
     found = failures(reasons)
-    assert [(f.count, f.simulation) for f in found] == [(2, 2), (1, 4), (1, 6)]
+    assert [(f.count, f.simulation) for f in found] == [(2, 3), (1, 5), (1, 7)]
     assert found[0].text.startswith("2 simulations failed, for example simulation 3: m: index 0 is out")
     assert found[1].text == "simulation 5 failed: m: car2 diverged at 0x7f01"
 

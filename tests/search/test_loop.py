@@ -91,7 +91,7 @@ def test_a_run_in_which_most_simulations_fail_has_failed() -> None:
     result = run(lag_problem("G[0,10] (x <= 2)", response=mostly_broken), budget=20)
     failures = sum(e.status == "failed" for e in result.evaluations)
     assert 10 < failures < 20
-    assert (result.status, result.spent.failures) == ("failed", failures)
+    assert (result.status, result.spent.failed) == ("failed", failures)
     assert result.reason.startswith(f"{failures} of 20 simulations failed; the last error: ")
     assert "'x' is nan at t = 0.5 s" in result.reason
     assert result.best is not None

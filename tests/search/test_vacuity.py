@@ -35,7 +35,7 @@ def test_a_condition_that_never_held_is_told_with_how_close_it_came() -> None:
     assert found.kind == "condition"
     assert found.part == "x >= 2"
     assert found.margin == pytest.approx(2 - best[0])
-    assert found.simulation == best[1]
+    assert found.simulation == best[1] + 1
     assert found.text.startswith(
         "The condition x >= 2 never held in 5 simulations, so x >= 2 -> u <= 0 was not tested. "
         f"It must hold at some time; at the closest, x reached {best[0]:.6g} (simulation {best[1] + 1}, "

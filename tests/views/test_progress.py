@@ -80,8 +80,8 @@ def test_a_cause_is_told_once_and_that_most_have_failed(capsys: pytest.CaptureFi
     warnings = [line for line in lines if line.startswith("warning: ")]
     assert len(warnings) == 1
     assert re.match(r"warning: \d+ of \d+ simulations have failed; the run counts as failed", warnings[0])
-    assert f"failed after 20 simulations, {result.spent.failures} of them failed" in result_text(result)
-    assert result_json(result)["spent"]["failures"] == result.spent.failures
+    assert f"failed after 20 simulations, {result.spent.failed} of them failed" in result_text(result)
+    assert result_json(result)["spent"]["failed"] == result.spent.failed
 
 
 def test_of_several_requirements_progress_names_the_one_that_improved(

@@ -179,7 +179,7 @@ def test_why_simulations_failed_and_what_was_not_searched_is_told() -> None:
     problem = replace(problem, space=space, parameters={"bias": 0.25})
     result = falsify(problem, "uniform", budget=20, seed=1)
     (cause,) = result.failures
-    assert cause.count == result.spent.failures > 1 and not result.evaluations[cause.simulation].verdict
+    assert cause.count == result.spent.failed > 1 and not result.evaluations[cause.simulation - 1].verdict
     for text in (result_text(result), results_text([result, replace(result, problem=problem)])):
         assert cause.text in text
         assert "v = 0 (not named beside what is searched" in text

@@ -80,7 +80,8 @@ def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
         means = [(s.mean or 0.0) if s else 0.0 for s in found]
         deviations = [(s.deviation or 0.0) if s else 0.0 for s in found]
         bars = ax.bar(at, means, width, yerr=deviations, label=caption(method.label), capsize=2)
-        ax.bar_label(bars, [f"{s.falsified}/{s.runs}" if s else "" for s in found], fontsize=7, padding=2)
+        rates = [f"{s.falsified_runs}/{s.runs}" if s else "" for s in found]
+        ax.bar_label(bars, rates, fontsize=7, padding=2)
     ax.set_xticks(np.arange(len(requirements)), list(map(caption, requirements)))
     ax.set(ylabel="simulations (mean, standard deviation)")
     ax.legend()

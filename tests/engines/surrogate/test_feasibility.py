@@ -34,7 +34,7 @@ def test_the_engine_avoids_regions_in_which_simulations_fail() -> None:
     failures = {}
     for label, settings in {"learns": HASTY, "does not": replace(HASTY, retries=0, risk_weight=0.0)}.items():
         runs = [falsify(problem, Surrogate(problem, seed=s, settings=settings), budget=15) for s in range(3)]
-        failures[label] = sum(run.spent.failures for run in runs)
+        failures[label] = sum(run.spent.failed for run in runs)
     assert failures["learns"] < 0.8 * failures["does not"], failures
 
 
