@@ -207,10 +207,10 @@ def hidden_margin(problem: Problem) -> tuple[str, str] | None:
             "the requirement can be violated only exactly on its limit, with robustness -0, however clear "
             "the violation is, because == and != have no margin where both sides are equal"
         )
-        equal = [p for p in formula.predicates if p.operator in ("==", "!=")]
-        if any(info.kind(name) == "real" for p in equal for name in p.signals):
+        equal = {n for p in formula.predicates if p.operator in ("==", "!=") for n in p.signals}
+        if any(info.kind(name) == "real" for name in equal):
             return what, "compare with a tolerance: for x == 3 write abs(x - 3) <= 0.5"
-        if len(equal) < len(formula.predicates):
+        if any(info.kind(name) == "real" for name in formula.signals):  # among whole numbers, all is as clear
             return what, f"write {tolerant}"
     signals = formula.signals
     if not signals or any(info.kind(name) != "boolean" for name in signals):

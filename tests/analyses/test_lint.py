@@ -65,6 +65,7 @@ FOUND = [
     ("G (gear != 3 or speed <= 9)", "margin", "", "write G (abs(gear - 3) > 0.5 or speed <= 9)"),
     ("G (rpm == 3 -> speed <= 9)", "margin", "", "for x == 3 write abs(x - 3) <= 0.5"),
     *((formula, "", "", "") for formula in ("G (speed <= 9 -> gear == 3)", "G (gear == 3 and speed <= 9)")),
+    ("G (gear == 3 -> F (gear > 3))", "", "", ""),
     ("G[0,60] (speed <= 5)", "invalid", "", "simulate longer"),
     ("G[0,20] (sped <= 5)", "invalid", "", "did you mean 'speed'"),
 ]  # fmt: skip
