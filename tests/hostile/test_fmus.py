@@ -102,6 +102,17 @@ def test_output_without_end_fills_neither_memory_nor_messages(hostile: FmuModel)
     assert os.fstat(worker(hostile).output.file.fileno()).st_size <= 1 << 20
 
 
+def test_descriptors_of_this_process_are_not_kept_by_what_watches_an_fmu(tmp_path: Path) -> None:
+    """Nor by Wine, which that process becomes."""
+    model = isolated("Hostile_2")
+    with (tmp_path / "open").open("w") as file:
+        os.set_inheritable(file.fileno(), True)
+        run(model, ("y",))
+    found = Path(f"/proc/{worker(model).program.pid}/fd").iterdir()
+    assert str(tmp_path / "open") not in map(os.readlink, found)
+    model.close()
+
+
 def test_what_an_fmu_forks_ends_with_its_process(hostile: FmuModel) -> None:
     pids = children(attack(hostile, FORK).log)
     assert len(pids) == 35

@@ -5,8 +5,10 @@ from collections.abc import Iterator
 
 import pytest
 
+from falsifier.core import posix
 from falsifier.errors import ModelError, SimulationError
 from falsifier.fmu import FmuModel
+from falsifier.fmu.process import start
 from falsifier.fmu.process.registry import REGISTRY
 from tests.fmu.fixtures import isolated, path, run
 
@@ -42,6 +44,7 @@ MISDEEDS = {
     "long text": "",
     "crash at event": "signal SIGSEGV",
     "hang at event": "time limit of 0.3 s",
+    "fast": "",
 }
 
 
@@ -80,5 +83,21 @@ def test_a_wrong_number_of_states_or_indicators_is_no_defect(
     model = FmuModel(path("Wild_3"), "model-exchange")
     with pytest.raises(ModelError, match=r"Wild_3\.fmu: .* (states|indicators); expected 0 to"):
         run(model, ("x",))
+    model.close()
+    REGISTRY.close()
+
+
+@pytest.mark.parametrize("misdeed", ["nothing", "fast"])
+def test_many_states_need_memory_for_matrices_only_if_steps_are_implicit(
+    misdeed: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Steps remain explicit if there is too little; two matrices of 10,000 states have 1.6 GB."""
+    REGISTRY.close()
+    monkeypatch.setattr(start, "_MEMORY_SHARE", 1e9 / posix.machine_memory())
+    monkeypatch.setenv("HOSTILE_STATES", "10000")
+    monkeypatch.setenv("FALSIFIER_FMU_VARIABLES", "HOSTILE_STATES")
+    model = FmuModel(path("Wild_3"), "model-exchange")
+    parameters = {"misdeed": float(list(MISDEEDS).index(misdeed))}
+    assert run(model, ("x",), parameters=parameters)["x"][-1] == pytest.approx(1.0)
     model.close()
     REGISTRY.close()

@@ -25,13 +25,27 @@ pytestmark = [
 
 # As in tests/fixtures/fmus/src/hostile.h; CRASH makes a simulation fail after a misdeed.
 NOTHING, CRASH = 0, 11
-CHANGE, READ_KEY, EXECUTE, BECOME, MEDDLE, DAEMONISE, BIG_FILE, SHARE, SHUT, REDIRECT, CONNECT = range(13, 24)
+(
+    CHANGE,
+    READ_KEY,
+    EXECUTE,
+    BECOME,
+    MEDDLE,
+    DAEMONISE,
+    BIG_FILE,
+    SHARE,
+    SHUT,
+    REDIRECT,
+    CONNECT,
+    LEND,
+    SWARM,
+) = range(13, 26)
 CLOSE = 9
 WAYS = (
     "create", "overwrite", "rename", "truncate", "delete", "make a folder", "make a link", "link",
     "link into its folder", "change permissions", "truncate while opening for reading",
     "write through a link", "change permissions of an open file", "move a file out of its folder",
-    "change times",
+    "change times", "change its version", "lease",
 )  # fmt: skip
 CREATE, OVERWRITE = WAYS.index("create"), WAYS.index("overwrite")
 TRUNCATE = WAYS.index("truncate")
@@ -143,6 +157,14 @@ def test_the_guard_survives_links_to_what_has_no_path(place: Place) -> None:
     assert place.run(NOTHING, more=more).splitlines()[-1] == "['0', '0', '0'] True"
 
 
+def test_no_advice_helps_with_files_without_a_name(place: Place) -> None:
+    """What is known of them is neither the link's folder nor ``/``, where the system says that they are."""
+    (place.home / "victim").unlink()
+    link = f"Path({str(place.home)!r}, 'victim').symlink_to(f'/proc/{{os.getpid()}}/fd/{{memory}}')"
+    said = place.run(CHANGE, 100 + OVERWRITE, before=f"memory = os.memfd_create('memory')\n{link}")
+    assert said.startswith("SimulationError failed") and "refused" not in said
+
+
 def test_the_guard_keeps_no_memory_of_what_it_does_not_tell(place: Place) -> None:
     """It tells of 32 files. Each of the last simulations has a call refused, for a path of 3 kB."""
     deep = place.home.joinpath(*(16 * ["x" * 200]))
@@ -164,6 +186,11 @@ print(memory() - before < 300)
 @pytest.mark.parametrize("before", [ALL, NO_LANDLOCK])
 def test_its_own_folder_is_its_own(place: Place, before: str) -> None:
     assert place.run(CHANGE, -1, before=before).split()[0] == "1"
+
+
+@pytest.mark.parametrize("before", [ALL, NO_LANDLOCK])
+def test_nobody_gets_the_rights_of_this_user_by_its_files(place: Place, before: str) -> None:
+    assert place.run(LEND, before=before).split()[0] == "0"
 
 
 @pytest.mark.parametrize("before", [ALL, NO_GUARD])
@@ -290,6 +317,12 @@ print(tried({}))
 """
 
 
-def test_shared_memory_counts(place: Place) -> None:
-    said = place.run(0, 0, more="model.close()\n" + SMALL.format(SHARE)).splitlines()
-    assert said[1].startswith("SimulationError crashed") and "more memory than it may" in said[1]
+@pytest.mark.parametrize(("variant", "reason"), [(0, "more memory than it may"), (1, "SIGKILL")])
+def test_shared_memory_counts(place: Place, variant: int, reason: str) -> None:
+    """Also if the first thread has ended, without which the system does not tell how much there is."""
+    said = place.run(0, 0, more="model.close()\n" + SMALL.format(f"{SHARE}, {variant}")).splitlines()
+    assert said[1].startswith("SimulationError crashed") and reason in said[1]
+
+
+def test_threads_are_limited(place: Place) -> None:
+    assert float(place.run(SWARM).split()[0]) < 8200

@@ -140,7 +140,7 @@ int main(void)
     uint32_t head[2];
     start_platform(report_crash);
     for (int goes_on = 1; goes_on && receive_bytes(head, sizeof head);) {
-        char *start = calloc(head[1] + 1, 1);
+        char *start = calloc((size_t)head[1] + 1, 1);
         struct request r = {start, start + head[1]};
         if (!start || !receive_bytes(r.at, head[1]))
             break;

@@ -10,7 +10,7 @@ from falsifier.core.signals import Signal
 from falsifier.errors import SimulationError
 from falsifier.fmu import Component, Coupling
 from falsifier.fmu.process.network import Method
-from tests.fmu.fixtures import path
+from tests.fmu.fixtures import altered, path
 from tests.fmu.small_systems import LOOP, STEP, loop, run, sampled_loop, solved, system
 from tests.fmu.support import ERROR, NAN
 
@@ -150,3 +150,22 @@ def test_values_that_do_not_fit_their_type_are_refused_with_the_component() -> N
         SimulationError, match=r"^system: values from 0 to 300 do not fit 'a.in_Int8', .* -128 to 127"
     ):
         run(model, "a.out_Int8", signals={"a.in_Int8": Signal((0.0, 1.0), (0.0, 300.0), "linear")})
+
+
+@pytest.mark.parametrize(
+    ("narrow", "value", "given"),
+    [("Int8", 300, 127), ("Int8", -300, -128), ("UInt8", -5, 0), ("UInt64", -5, 0)],
+)
+def test_outputs_beyond_their_declared_limits_become_the_nearest_value_of_the_input(
+    narrow: str, value: int, given: int, tmp_path: Path
+) -> None:
+    limits = b'name="out_Int16" min="0" max="100"'
+    liar = altered(
+        path("Echo_3"),
+        tmp_path / "Liar.fmu",
+        lambda xml: xml.replace(b'name="out_Int16"', limits),
+        ending="modelDescription.xml",
+    )
+    model = system({"a": Component(liar), "b": "Echo_3"}, {f"b.in_{narrow}": "a.out_Int16"})
+    held = Signal((0.0, 1.0), (float(value), float(value)), "linear")
+    assert run(model, f"b.out_{narrow}", signals={"a.in_Int16": held})[f"b.out_{narrow}"][-1] == given

@@ -130,8 +130,8 @@ static unsigned find_jacobian(struct solver *s)
 /* Factorise 1 - hg J into triangular matrices, with row exchanges. */
 static void factorise(struct solver *s, double hg)
 {
-    double *a = s->factors;
     size_t n = s->n;
+    double *a = s->jacobian + n * n;
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++)
             a[i * n + j] = (i == j ? 1.0 : 0.0) - hg * s->jacobian[i * n + j];
@@ -160,8 +160,8 @@ static void factorise(struct solver *s, double hg)
 /* Solve the linear system with the factors, in place of the right-hand side. */
 static void substitute(const struct solver *s, double *b)
 {
-    const double *a = s->factors;
     size_t n = s->n;
+    const double *a = s->jacobian + n * n;
     for (size_t c = 0; c < n; c++) {
         double kept = b[c];
         b[c] = b[s->pivots[c]];

@@ -33,7 +33,7 @@ struct solver {
     double *x, *new_x;          /* states, and those at the end of a trial step */
     double *stages[STAGES];     /* derivatives at the stages of a step */
     double *work[4];
-    double *jacobian, *factors; /* n by n, row by row */
+    double *jacobian; /* n by n, row by row, then its factors; none before the first implicit step */
     size_t *pivots;
     double *z, *new_z, *z_low, *z_high, *z_trial; /* event indicators */
 };

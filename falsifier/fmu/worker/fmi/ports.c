@@ -29,7 +29,12 @@ static double fetch(const struct place *place)
     return value * place->sign;
 }
 
-/* Write a number to a variable's location; integers and Booleans are rounded. */
+/* By storage; of 64 bits, the numbers next to those that do not fit. */
+static const double least[] = {0, 0, INT8_MIN, 0, INT16_MIN, 0, INT32_MIN, 0, -0x1p63, 0};
+static const double most[] = {0,          0,         INT8_MAX,   UINT8_MAX,        INT16_MAX,
+                              UINT16_MAX, INT32_MAX, UINT32_MAX, 0x1.fffffffffffffp62, 0x1.fffffffffffffp63};
+
+/* Write a number to a variable's location; integers and Booleans are rounded, to a number that the location can hold. */
 void put(const struct place *place, double number)
 {
     double value = number * place->sign;
@@ -39,16 +44,20 @@ void put(const struct place *place, double number)
     }
     if (place->is_boolean)
         value = (number >= 0.5) == (place->sign > 0.0);
+    if (place->storage == 1) {
+        *(float *)place->address = (float)value;
+        return;
+    }
+    value = fmin(fmax(rint(value), least[place->storage]), most[place->storage]);
     switch (place->storage) {
-    case 1: *(float *)place->address = (float)value; break;
-    case 2: *(int8_t *)place->address = (int8_t)rint(value); break;
-    case 3: *(uint8_t *)place->address = (uint8_t)rint(value); break;
-    case 4: *(int16_t *)place->address = (int16_t)rint(value); break;
-    case 5: *(uint16_t *)place->address = (uint16_t)rint(value); break;
-    case 6: *(int32_t *)place->address = (int32_t)rint(value); break;
-    case 7: *(uint32_t *)place->address = (uint32_t)rint(value); break;
-    case 8: *(int64_t *)place->address = (int64_t)rint(value); break;
-    default: *(uint64_t *)place->address = (uint64_t)rint(value); break;
+    case 2: *(int8_t *)place->address = (int8_t)value; break;
+    case 3: *(uint8_t *)place->address = (uint8_t)value; break;
+    case 4: *(int16_t *)place->address = (int16_t)value; break;
+    case 5: *(uint16_t *)place->address = (uint16_t)value; break;
+    case 6: *(int32_t *)place->address = (int32_t)value; break;
+    case 7: *(uint32_t *)place->address = (uint32_t)value; break;
+    case 8: *(int64_t *)place->address = (int64_t)value; break;
+    default: *(uint64_t *)place->address = (uint64_t)value; break;
     }
 }
 

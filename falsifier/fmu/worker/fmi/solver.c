@@ -6,6 +6,7 @@
  * explicit steps, the rest of the simulation uses implicit ones. */
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #include "fmi/model_exchange.h"
@@ -53,8 +54,6 @@ void prepare_solver(struct fmu *fmu, struct plan *plan)
         s->stages[i] = guarded(s->n);
     for (int i = 0; i < 4; i++)
         s->work[i] = guarded(s->n);
-    s->jacobian = need(s->n * s->n, sizeof(double));
-    s->factors = need(s->n * s->n, sizeof(double));
     s->pivots = need(s->n, sizeof(size_t));
     double **z[] = {&s->z, &s->new_z, &s->z_low, &s->z_high, &s->z_trial};
     for (int i = 0; i < 5; i++)
@@ -123,6 +122,14 @@ static void watch_stiffness(struct solver *s, double stiffness)
     } else if (s->stiff_hits && ++s->other_hits >= OTHER_STEPS) {
         s->stiff_hits = 0;
     }
+}
+
+/* Most systems never need them. Where there is no memory for them, steps remain explicit. */
+static int has_matrices(struct solver *s)
+{
+    if (!s->jacobian)
+        s->jacobian = calloc(s->n * s->n, 2 * sizeof(double));
+    return s->jacobian != NULL;
 }
 
 static double spacing(double x)
@@ -256,7 +263,7 @@ static struct outcome step_towards(struct solver *s, double target, int *wants_e
     memcpy(s->x, s->new_x, s->n * sizeof(double));
     memcpy(s->stages[0], s->stages[s->implicit ? 5 : 6], s->n * sizeof(double));
     memcpy(s->z, s->new_z, s->indicators * sizeof(double));
-    if (s->stiff_hits >= STIFF_STEPS && !s->implicit) {
+    if (s->stiff_hits >= STIFF_STEPS && !s->implicit && has_matrices(s)) {
         s->implicit = 1;
         s->jacobian_known = 0;
     }
@@ -344,7 +351,9 @@ void *keep_solver(const struct fmu *fmu, void *kept)
 void bring_back_solver(struct fmu *fmu, void *kept)
 {
     struct solver *s = fmu->solver;
+    double *jacobian = s->jacobian;
     *s = *(const struct solver *)kept;
+    s->jacobian = jacobian;
     move(s, (char *)kept + sizeof *s, 0);
     s->jacobian_known = 0;
 }

@@ -13,6 +13,7 @@
 #include <fcntl.h>
 #include <limits.h>
 #include <linux/seccomp.h>
+#include <sched.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,7 +33,7 @@
 
 /* Of answers, beside numbers of errors and 0, if the guard has done it. */
 enum { GO_ON = -1 };
-enum { MOST_PROCESSES = 256, MOST_ANCESTORS = 1000, SMALL = 16 << 20 };
+enum { MOST_PROCESSES = 256, MOST_THREADS = 8192, MOST_ANCESTORS = 1000, SMALL = 16 << 20 };
 
 #define KIND(number, treatment) {number, treatment, -1, -1, -1, -1}
 #define NO(name) KIND(__NR_##name, FORBIDDEN)
@@ -69,13 +70,15 @@ const struct call calls[] = {
     LOOK(ptrace), LOOK(process_vm_readv), LOOK(process_vm_writev), LOOK(kcmp),
     KIND(438 /* pidfd_getfd */, LOOKING_INTO), KIND(440 /* process_madvise */, LOOKING_INTO),
     KIND(448 /* process_mrelease */, LOOKING_INTO),
-    /* Filters see neither arguments in memory nor those in a queue; memory of no process escapes the limit. */
+    /* Filters see neither arguments in memory nor those in a queue; memory of no process escapes the limit. All
+     * processes of the machine share a number of queues. */
     KIND(435 /* clone3 */, UNKNOWN), KIND(437 /* openat2 */, UNKNOWN), KIND(425 /* io_uring_setup */, UNKNOWN),
     KIND(426 /* io_uring_enter */, UNKNOWN), KIND(427 /* io_uring_register */, UNKNOWN),
+    KIND(__NR_io_setup, UNKNOWN),
     KIND(424 /* pidfd_send_signal */, UNKNOWN), KIND(__NR_memfd_create, UNKNOWN),
     KIND(447 /* memfd_secret */, UNKNOWN),
     PATH(openat, OPENING, 0, 1), PATH(unlinkat, CHANGING, 0, 1), PATH(mkdirat, CHANGING, 0, 1),
-    PATH(mknodat, CHANGING, 0, 1), PATH(symlinkat, CHANGING, 1, 2), PATHS(linkat, 0, 1, 2, 3),
+    PATH(mknodat, MAKING, 0, 1), PATH(symlinkat, CHANGING, 1, 2), PATHS(linkat, 0, 1, 2, 3),
     PATH(truncate, CHANGING, -1, 0), PATHS(renameat2, 0, 1, 2, 3),
     PATH(fchmod, SETTING, 0, -1), PATH(fchmodat, SETTING, 0, 1), PATH(utimensat, SETTING, 0, 1),
     {452 /* fchmodat2 */, SETTING, 0, 1, -1, -1},
@@ -84,8 +87,8 @@ const struct call calls[] = {
     PATHS(renameat, 0, 1, 2, 3),
 #endif
 #ifdef __NR_open
-    PATH(open, OPENING, -1, 0), PATH(creat, CHANGING, -1, 0), PATH(unlink, CHANGING, -1, 0),
-    PATH(rmdir, CHANGING, -1, 0), PATH(mkdir, CHANGING, -1, 0), PATH(mknod, CHANGING, -1, 0),
+    PATH(open, OPENING, -1, 0), PATH(creat, MAKING, -1, 0), PATH(unlink, CHANGING, -1, 0),
+    PATH(rmdir, CHANGING, -1, 0), PATH(mkdir, CHANGING, -1, 0), PATH(mknod, MAKING, -1, 0),
     PATH(symlink, CHANGING, -1, 1), PATHS(link, -1, 0, -1, 1), PATHS(rename, -1, 0, -1, 1),
     PATH(chmod, SETTING, -1, 0), PATH(utime, SETTING, -1, 0), PATH(utimes, SETTING, -1, 0),
     PATH(futimesat, SETTING, 0, 1),
@@ -180,16 +183,19 @@ void kill_children(pid_t worker)
         kill(ours[k - 1], SIGKILL);
 }
 
-/* Own memory and shared memory; what comes from files does not count. */
+/* Own memory and shared memory; what comes from files does not count. A process whose first thread has ended, while
+ * others go on, does not show its memory and is killed. */
 static uint64_t memory_of(pid_t pid)
 {
     char path[64];
-    unsigned long all = 0, shared = 0;
+    unsigned long size = 1, all = 0, shared = 0;
     const uint64_t page = (uint64_t)sysconf(_SC_PAGESIZE);
     snprintf(path, sizeof path, "/proc/%d/statm", (int)pid);
     FILE *file = fopen(path, "re");
-    if (file && fscanf(file, "%*u %lu %lu", &all, &shared) != 2)
+    if (file && fscanf(file, "%lu %lu %lu", &size, &all, &shared) != 3)
         all = shared = 0;
+    if (!size)
+        kill(pid, SIGKILL);
     if (file)
         fclose(file);
     /* To tell shared memory from files takes longer. */
@@ -224,6 +230,19 @@ static int may_start_another(void)
     }
     processes++;
     return 1;
+}
+
+/* Threads are counted when as many as there may be have started since they were counted last. */
+static int may_start_thread(void)
+{
+    static size_t threads;
+    const pid_t *ours;
+    if (++threads <= MOST_THREADS)
+        return 1;
+    threads = 1;
+    for (size_t k = find_ours(&ours); k > 0; k--)
+        threads += (size_t)status_of(ours[k - 1], "Threads:");
+    return threads <= MOST_THREADS;
 }
 
 static int read_memory(pid_t pid, uint64_t address, void *target, size_t count)
@@ -279,23 +298,27 @@ static int is_beneath(const char *path, const char **places)
     return 0;
 }
 
-/* The path of an open file without links; 0 if it has none, such as a pipe. */
+/* The path of an open file without links; empty and 0 if it has none, such as a pipe or memory. */
 static int path_of(int file, char *path)
 {
     char place[64];
     snprintf(place, sizeof place, "/proc/self/fd/%d", file);
     const ssize_t length = readlink(place, path, PATH_MAX - 1);
     path[length > 0 ? length : 0] = 0;
-    return *path == '/';
+    if (*path != '/' || access(path, F_OK))
+        *path = 0;
+    return *path != 0;
 }
 
-/* Replace a path by that of the file that it leads to; 0 if there is none. Much faster than realpath for deep ones. */
+/* Replace a path by that of the file that it leads to; 0 if that has none, -1 if it does not exist. Much faster than
+ * realpath for deep ones. */
 static int follow_links(char *path)
 {
     const int file = open(path, O_PATH | O_CLOEXEC);
-    const int found = file >= 0 && path_of(file, path);
-    if (file >= 0)
-        close(file);
+    if (file < 0)
+        return errno == ENOENT ? -1 : 0;
+    const int found = path_of(file, path);
+    close(file);
     return found;
 }
 
@@ -304,15 +327,16 @@ static int resolve(char *path, int follow)
 {
     char last[PATH_MAX], *slash;
     size_t length = strlen(path);
-    if (follow && follow_links(path))
-        return 1;
+    const int found = follow ? follow_links(path) : -1;
+    if (found >= 0)
+        return found;
     while (length > 1 && path[length - 1] == '/')
         path[--length] = 0;
     if (!(slash = strrchr(path, '/')))
         return 0;
     strcpy(last, slash);
     slash[slash == path] = 0;
-    if (!follow_links(path) || strlen(path) + strlen(last) + 1 > PATH_MAX)
+    if (follow_links(path) <= 0 || strlen(path) + strlen(last) + 1 > PATH_MAX)
         return 0;
     strcpy(path + (path[1] ? strlen(path) : 0), last);
     return 1;
@@ -339,7 +363,12 @@ static int answer_change(
 {
     char path[PATH_MAX];
     const signed char places[][2] = {{call->folder, call->path}, {call->folder_2, call->path_2}};
-    int refused = 0;
+    const __u64 *mode = &asked->data.args[call->path + 1];
+    int refused = 0, makes = call->treatment == MAKING;
+    if (call->treatment == OPENING && *mode & (O_CREAT | (O_TMPFILE & ~O_DIRECTORY)))
+        makes = 1, mode++;
+    if (makes && *mode & (S_ISUID | S_ISGID))
+        return EPERM; /* whoever executes it would have this user's rights */
     for (int k = 0; k < 2; k++) {
         if (places[k][1] < 0 || !read_path(asked, places[k][0], places[k][1], path))
             continue;
@@ -367,8 +396,8 @@ static int read_times(const struct seccomp_notif *asked, struct timespec *times)
             return 0;
         if (is_short)
             numbers[2] = numbers[1], numbers[1] = numbers[3] = 0;
-        if (is_micro)
-            numbers[1] *= 1000, numbers[3] *= 1000;
+        for (int k = 1; is_micro && k < 4; k += 2)
+            numbers[k] = numbers[k] < 0 || numbers[k] >= 1000000 ? -1 : 1000 * numbers[k]; /* -1 is refused */
     }
     for (int k = 0; k < 2; k++) {
         times[k].tv_sec = numbers[2 * k];
@@ -400,7 +429,7 @@ static int answer_setting(const struct seccomp_notif *asked, const struct call *
     snprintf(place, sizeof place, "/proc/self/fd/%d", file);
     if (!path_of(file, path) || !is_beneath(path, policy->writable)) {
         error = EPERM;
-        if (*path == '/' && !fstat(file, &found) && (found.st_uid == geteuid() || !geteuid()))
+        if (*path && !fstat(file, &found) && (found.st_uid == geteuid() || !geteuid()))
             tell(CHANGE, path);
     } else if (is_mode ? chmod(place, (mode_t)args[position] & 0777) : utimensat(AT_FDCWD, place, times, 0)) {
         error = errno;
@@ -427,7 +456,7 @@ static int answer_process(const struct seccomp_notif *asked)
     const int number = asked->data.nr;
     const int is_by_kind = number == __NR_setpriority || number == __NR_ioprio_set;
     const int pid = (int)asked->data.args[is_by_kind ? 1 : 0];
-    if (is_ours(pid < -1 ? -pid : pid))
+    if (is_ours(pid < -1 ? (pid_t)-(unsigned)pid : pid)) /* a group; the smallest number remains negative */
         return GO_ON;
     for (int k = 0; k < SIGNALLING_CALLS; k++)
         if (number == process_calls[k]) {
@@ -445,6 +474,7 @@ static int answer(const struct seccomp_notif *asked, const struct policy *policy
             continue;
         switch (calls[k].treatment) {
         case OPENING:
+        case MAKING:
         case CHANGING: return answer_change(asked, &calls[k], policy, enforced);
         case SETTING: return answer_setting(asked, &calls[k], policy);
         case EXECUTING: return answer_execution(asked, &calls[k], policy, worker);
@@ -457,7 +487,8 @@ static int answer(const struct seccomp_notif *asked, const struct policy *policy
 #endif
     if (!is_fork)
         return answer_process(asked);
-    if (may_start_another())
+    const int is_thread = asked->data.nr == __NR_clone && asked->data.args[0] & CLONE_THREAD;
+    if (is_thread ? may_start_thread() : may_start_another())
         return GO_ON;
     tell(FORK, "");
     return EAGAIN;

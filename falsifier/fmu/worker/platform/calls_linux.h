@@ -19,6 +19,7 @@ enum treatment {
     LOOKING_INTO, /* other processes' memory; Wine does it, and Landlock allows it in its own processes */
     OPENING,      /* a file, to change it if the flags say so */
     CHANGING,     /* a folder or a file by its path */
+    MAKING,       /* the same, with the file's permissions behind the path */
     SETTING,      /* permissions or times, which Landlock does not see: the guard does it */
     EXECUTING
 };

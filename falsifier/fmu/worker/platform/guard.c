@@ -25,7 +25,7 @@
 
 #include "platform/sandbox.h"
 
-enum { LINE = 5, MOST_BYTES = 1 << 20, MOST_TOLD = 32, TICK_MS = 100, CANNOT_START = 71 };
+enum { LINE = 5, MOST_BYTES = 1 << 20, MOST_TOLD = 32, MOST_FILES = 4096, TICK_MS = 100, CANNOT_START = 71 };
 
 static volatile sig_atomic_t is_told_to_end;
 static int wakes[2];
@@ -131,6 +131,7 @@ static void limit(int resource, rlim_t most)
 static void limit_resources(const struct policy *policy)
 {
     limit(RLIMIT_CORE, 0);
+    limit(RLIMIT_NOFILE, MOST_FILES); /* sockets hold memory that belongs to no process */
     if (!policy->memory)
         return;
     limit(RLIMIT_FSIZE, (rlim_t)policy->memory);

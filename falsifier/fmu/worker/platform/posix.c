@@ -24,7 +24,7 @@
 #include "platform/platform.h"
 #include "platform/sandbox.h"
 
-enum { REPLIES = 3, ROOM = 4, LAST = ROOM };
+enum { REPLIES = 3, ROOM = 4, LINE = 5, LAST = LINE };
 
 /* A copy of descriptor 0, so that the FMU does not read requests from its standard input. */
 static int requests;
@@ -47,8 +47,8 @@ static void close_others(void)
 void start_platform(void (*report)(unsigned code))
 {
     (void)report;
-    start_guarded();
     close_others();
+    start_guarded();
     requests = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, LAST + 1);
     int nothing = open("/dev/null", O_RDONLY);
     if (nothing > 0 && nothing != STDIN_FILENO) {

@@ -13,7 +13,6 @@
 #include <linux/audit.h>
 #include <linux/capability.h>
 #include <linux/filter.h>
-#include <linux/fs.h>
 #include <linux/netlink.h>
 #include <linux/sched.h>
 #include <linux/seccomp.h>
@@ -270,6 +269,9 @@ static void on_sockets(struct program *p, const struct policy *policy)
     end(p, begun);
     /* Datagrams could be sent elsewhere. */
     begun = begin(p, SYS_socketpair);
+    load_argument(p, 0);
+    add(p, BPF_JMP | BPF_JEQ | BPF_K, 1, 0, AF_UNIX);
+    finish(p, refuse(EACCES));
     load_argument(p, 1);
     add(p, BPF_ALU | BPF_AND | BPF_K, 0, 0, 0xf);
     on_value(p, SOCK_STREAM, ALLOW);
@@ -278,16 +280,19 @@ static void on_sockets(struct program *p, const struct policy *policy)
     end(p, begun);
 }
 
-/* Settings of files that need no permission to write, input to terminals, and who gets signals of a file. */
+/* Only those of terminals, which include those of all files, and of sockets: file systems have others that change
+ * what is merely open for reading, and make folders. Neither input to terminals, nor who gets signals of a file. */
 static void on_device_calls(struct program *p)
 {
-    static const uint32_t refused[] = {FS_IOC_SETFLAGS, FS_IOC32_SETFLAGS, FS_IOC_SETVERSION, FS_IOC_FSSETXATTR,
-                                       FS_IOC_SET_ENCRYPTION_POLICY, TIOCSTI, TIOCLINUX, FIOSETOWN, SIOCSPGRP};
+    static const uint32_t refused[] = {TIOCSTI, TIOCLINUX, FIOSETOWN, SIOCSPGRP};
     const unsigned short begun = begin(p, SYS_ioctl);
     load_argument(p, 1);
     for (size_t k = 0; k < sizeof refused / sizeof *refused; k++)
         on_value(p, refused[k], refuse(EPERM));
-    finish(p, ALLOW);
+    add(p, BPF_ALU | BPF_AND | BPF_K, 0, 0, 0xff00);
+    on_value(p, 'T' << 8, ALLOW);
+    on_value(p, 0x8900, ALLOW);
+    finish(p, refuse(ENOTTY));
     end(p, begun);
 }
 
@@ -298,7 +303,6 @@ static void on_starts(struct program *p, uint32_t forking)
     unsigned short begun = begin(p, SYS_clone);
     load_argument(p, 0);
     on_bits(p, spaces & ~0xffu, refuse(EPERM)); /* the lowest byte is a signal */
-    on_bits(p, CLONE_THREAD, ALLOW);
     finish(p, forking);
     end(p, begun);
     begun = begin(p, SYS_unshare);
@@ -321,6 +325,7 @@ static uint32_t action_of(enum treatment treatment, const struct policy *policy,
     case UNKNOWN: return refuse(ENOSYS); /* programs use an older call then, which can be looked at */
     case UNSUPPORTED: return refuse(EOPNOTSUPP);
     case LOOKING_INTO: return policy->is_wine ? ALLOW : refuse(EPERM);
+    case MAKING:
     case CHANGING: return has_guard ? ask : ALLOW;
     case SETTING: return has_guard ? ask : refuse(EPERM);
     case EXECUTING: return has_guard ? ask : policy->programs ? ALLOW : refuse(EACCES);
@@ -357,16 +362,19 @@ static void write_filter(struct program *p, const struct policy *policy, int has
         on_process(p, (uint32_t)process_calls[k], 0, ours);
     on_any(p, SYS_setpriority, PRIO_PROCESS, PRIO_USER, ours);
     on_any(p, SYS_ioprio_set, 1, 3, ours);
-    /* The owner of a file may get any signal whenever something can be read; Landlock sees it since version 6. */
+    /* The owner of a file may get any signal whenever something can be read; Landlock sees it since version 6. A
+     * lease lets others wait who open the file. */
     begun = begin(p, SYS_fcntl);
     load_argument(p, 1);
     on_value(p, F_SETOWN, refuse(EPERM));
     on_value(p, F_SETOWN_EX, refuse(EPERM));
+    on_value(p, F_SETLEASE, refuse(EPERM));
     finish(p, ALLOW);
     end(p, begun);
     begun = begin(p, SYS_prctl);
     load_argument(p, 0);
     on_value(p, PR_SET_PDEATHSIG, refuse(EPERM));
+    on_value(p, PR_SET_DUMPABLE, refuse(EPERM)); /* /proc may hide it from the guard then */
     finish(p, ALLOW);
     end(p, begun);
     finish(p, ALLOW);
