@@ -15,6 +15,7 @@ from hypothesis import HealthCheck, settings
 from falsifier.campaigns import run_campaign
 from falsifier.core.files import cache_directory
 from falsifier.errors import speak_to
+from tests import forking
 from tests.campaigns.support import request, work_in_threads
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does
@@ -25,6 +26,8 @@ settings.load_profile("patient")
 
 # Their tests take longest. Started last, one of them would run while the other processes have nothing to do.
 _FIRST = ("test_notebooks.py", "test_docs.py", "test_packaging.py", "test_kill.py")
+# Those outside tests/llm that have litellm imported, in seconds: one process then does for all.
+_WITH_LITELLM = ("test_formalize.py", "test_llm.py")
 
 _real_connect = socket.socket.connect
 
@@ -39,9 +42,24 @@ def _guarded_connect(self: socket.socket, address: Any) -> None:
     _real_connect(self, address)
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node: Any) -> None:
+    """Give the processes of pytest-xdist one server that forks."""
+    node.workerinput["forks"] = forking.address()
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    forking.given = getattr(config, "workerinput", {}).get("forks")
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let long tests start first; the others keep their order."""
-    items.sort(key=lambda item: item.path.name not in _FIRST)
+    """Let long tests start first, and those that import litellm stand together."""
+
+    def place(item: pytest.Item) -> tuple[bool, str]:
+        folder = item.path.relative_to(Path(__file__).parent).parts[0]
+        return item.path.name not in _FIRST, "llm" if item.path.name in _WITH_LITELLM else folder
+
+    items.sort(key=place)
 
 
 @pytest.fixture(autouse=True, scope="session")

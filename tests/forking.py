@@ -1,7 +1,7 @@
 """A process that has imported what is slow to import, and forks a copy of itself for each command.
 
 Most of the time that a command takes is spent on imports. The copy is a process like any other, with an
-environment, a folder, standard streams and an exit code of its own.
+environment, a folder, standard streams and an exit code of its own. All processes of a session share it.
 """
 
 import atexit
@@ -9,9 +9,13 @@ import gc
 import importlib
 import json
 import os
+import select
+import shutil
 import signal
+import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import traceback
 from collections.abc import Mapping, Sequence
@@ -19,12 +23,13 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from pkgutil import walk_packages
-from typing import NoReturn
+from typing import NoReturn, TextIO
 
 from tests.patience import HANG
 
 # Imported by commands when they need them.
 _SLOW = (
+    "hypothesis",
     "matplotlib.backends.backend_agg",
     "matplotlib.figure",
     "matplotlib.font_manager",
@@ -38,6 +43,8 @@ _SLOW = (
 _LARGE = ("falsifier", "openai.resources")
 # What runs when it is imported.
 _NEVER = ("falsifier.__main__",)
+# Where the server of another process listens.
+given: str | None = None
 _ONE_AT_A_TIME = threading.Lock()
 
 
@@ -46,28 +53,58 @@ def run(
 ) -> int:
     """Run ``falsifier`` or ``pytest`` with files for its standard streams; return its exit code."""
     with _ONE_AT_A_TIME:
-        requests, codes = _server().stdin, _server().stdout
-        assert requests is not None and codes is not None
-        requests.write(json.dumps([list(command), str(folder), dict(environment), streams]) + "\n")
-        requests.flush()
-        return int(codes.readline())
+        server = _connection()
+        server.write(json.dumps([list(command), str(folder), dict(environment), streams]) + "\n")
+        server.flush()
+        return int(server.readline())
 
 
 @cache
-def _server() -> "subprocess.Popen[str]":
-    """The one of this process, started when it is first needed; it ends with this process."""
+def address() -> str:
+    """Start a server, which ends with this process; return where it listens."""
     clean = {k: v for k, v in os.environ.items() if not k.endswith(("_API_KEY", "_TOKEN"))}
-    return subprocess.Popen(
+    server = subprocess.Popen(
         [sys.executable, "-c", "from tests.forking import serve; serve()"],
         env=clean | {"PYTHONPATH": os.pathsep.join(sys.path)},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
     )
+    assert server.stdin is not None and server.stdout is not None
+    os.dup(server.stdin.fileno())  # open as long as this process
+    return server.stdout.readline().rstrip("\n")
+
+
+@cache
+def _connection() -> TextIO:
+    """What the server answers this process by."""
+    connection = socket.socket(socket.AF_UNIX)
+    connection.connect(given or address())
+    return connection.makefile("rw")
 
 
 def serve() -> None:
-    """Fork for each line of standard input; the copies run the command that stands there, and end."""
+    """Answer who connects, until standard input ends."""
+    # The path of a socket has 104 bytes at the most on macOS. Copies must not remove it at their end.
+    folder = tempfile.mkdtemp(dir="/tmp")
+    with socket.socket(socket.AF_UNIX) as listening:
+        listening.bind(f"{folder}/forks")
+        listening.listen()
+        print(f"{folder}/forks", flush=True)
+        is_ready = False
+        while sys.stdin not in select.select([listening, sys.stdin], [], [])[0]:
+            connection, _ = listening.accept()
+            if not is_ready:
+                _import()
+                is_ready = True
+            if not os.fork():
+                _answer(connection.makefile("rw"))
+                os._exit(0)
+            connection.close()
+    shutil.rmtree(folder)
+
+
+def _import() -> None:
     from falsifier.llm.usage import count_tokens
 
     importlib.import_module("falsifier.llm.litellm_adapter").load_litellm()
@@ -78,14 +115,18 @@ def serve() -> None:
             importlib.import_module(name)
     count_tokens("")
     gc.freeze()
-    for line in sys.stdin:
+
+
+def _answer(requests: TextIO) -> None:
+    """Fork for each line; the copies run the command that stands there, and end."""
+    for line in requests:
         pid = os.fork()
         if not pid:
             signal.alarm(int(HANG))
             _become(*json.loads(line))
             _run_and_end()
         _, status = os.waitpid(pid, 0)
-        print(os.waitstatus_to_exitcode(status), flush=True)
+        print(os.waitstatus_to_exitcode(status), file=requests, flush=True)
 
 
 def _become(command: list[str], folder: str, environment: dict[str, str], streams: list[str]) -> None:
