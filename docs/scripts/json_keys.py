@@ -81,7 +81,7 @@ _COMMON: _Told = {
         "1, at which that part came closest to changing its truth; these three may be null",
     ),
     "interrupted": ("Boolean", "whether it was stopped; the rest is of what was simulated by then"),
-    "spent": ("object", "what was [spent](#what-was-spent); one command alone has `simulations` only"),
+    "spent": ("object", "what was [spent](#what-was-spent); but for runs and campaigns `simulations` only"),
     "files": ("list", "files that were written"),
 }
 _CANDIDATE: _Told = {

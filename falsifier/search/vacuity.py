@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import ModelInfo
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import counted, listed, readable
 from falsifier.evaluation.evaluate import Evaluation, monitor_for
 from falsifier.problem.problem import Problem
 from falsifier.search.findings import Finding, FindingKind
-from falsifier.stl.expression import Number
+from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Number
 from falsifier.stl.formula import Formula, Implies, Next, Or, Predicate, Temporal
 from falsifier.stl.intervals import without_equality
 from falsifier.stl.margins import is_on_limit, shown, signed
@@ -199,6 +200,20 @@ def _reached(formula: Formula, values: Mapping[str, float]) -> str:
     return listed([f"{side} reached {readable(float(side.evaluate(values)))}" for side in sides])
 
 
+def _is_whole(part: Expression, info: ModelInfo) -> bool:
+    """Whether a part of an expression keeps whole numbers whole."""
+    match part:
+        case Name(name):
+            return info.kind(name) != "real"
+        case Number(value):
+            return value.is_integer()
+        case Arithmetic(operator):
+            return operator in ("+", "-", "*")
+        case Call(function):
+            return function in ("abs", "min", "max")
+    return True
+
+
 def hidden_margin(problem: Problem) -> tuple[str, str] | None:
     """Return why Booleans, or ==, leave the robustness without a margin, and what to do; None if not."""
     formula, info = problem.requirement.formula, problem.info
@@ -207,8 +222,8 @@ def hidden_margin(problem: Problem) -> tuple[str, str] | None:
             "the requirement can be violated only exactly on its limit, with robustness -0, however clear "
             "the violation is, because == and != have no margin where both sides are equal"
         )
-        equal = {n for p in formula.predicates if p.operator in ("==", "!=") for n in p.signals}
-        if any(info.kind(name) == "real" for name in equal):
+        equal = [side for p in formula.predicates if p.operator in ("==", "!=") for side in p.sides]
+        if not all(_is_whole(part, info) for side in equal for part in side.walk()):
             return what, "compare with a tolerance: for x == 3 write abs(x - 3) <= 0.5"
         if any(info.kind(name) == "real" for name in formula.signals):  # among whole numbers, all is as clear
             return what, f"write {tolerant}"

@@ -63,7 +63,11 @@ FOUND = [
     ("G[0,9] (1.5 != gear or speed <= 9)", "always", "1.5 != gear", "always holds: expected an integer"),
     ("G (gear == 3 -> speed <= 9)", "margin", "", "write G (abs(gear - 3) <= 0.5 -> speed <= 9)"),
     ("G (gear != 3 or speed <= 9)", "margin", "", "write G (abs(gear - 3) > 0.5 or speed <= 9)"),
-    ("G (rpm == 3 -> speed <= 9)", "margin", "", "for x == 3 write abs(x - 3) <= 0.5"),
+    ("G (abs(gear - 3) == 0 -> speed <= 9)", "margin", "", "write G (abs(abs(gear - 3) - 0) <= 0.5 -> speed"),
+    *(
+        (f"G ({side} -> speed <= 9)", "margin", "", "for x == 3 write abs(x - 3) <= 0.5")
+        for side in ("rpm == 3", "gear / 2 == 1", "1 == sqrt(gear)", "0.5*gear == 1")
+    ),
     *((formula, "", "", "") for formula in ("G (speed <= 9 -> gear == 3)", "G (gear == 3 and speed <= 9)")),
     ("G (gear == 3 -> F (gear > 3))", "", "", ""),
     ("G[0,60] (speed <= 5)", "invalid", "", "simulate longer"),
