@@ -95,8 +95,8 @@ def check_names(engine: str | None, llm: LLMSettings | None) -> None:
     if llm is None:
         if engine in LLM_ENGINES:
             raise SpecError(
-                f"the engine {engine!r} needs a language model: give the run or campaign one "
-                f"({setting('llm', 'NAME')}), or choose another engine"
+                f"the engine {engine!r} needs a language model: name one ({setting('llm', 'NAME')}), "
+                "or choose another engine"
             )
         check_engine(engine or DEFAULT_ENGINE)
         return
