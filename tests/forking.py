@@ -78,9 +78,11 @@ def address() -> str:
 @cache
 def _connection() -> TextIO:
     """What the server answers this process by."""
-    connection = socket.socket(socket.AF_UNIX)
-    connection.connect(given or address())
-    return connection.makefile("rw")
+    with socket.socket(socket.AF_UNIX) as connection:
+        connection.connect(given or address())
+        answers = connection.makefile("rw")
+    atexit.register(answers.close)
+    return answers
 
 
 def serve() -> None:
