@@ -247,6 +247,8 @@ def _other_keys(text: str) -> str:
         return f" that can be read: {error.msg} after {before}"
     except RecursionError:
         return ": it is nested too deeply"
+    if "candidates" in _plain_keys(found):
+        return ": expected 'candidates' to be a list of objects, and not an empty one"
     keys = ", ".join(quoted(key) for key in list(found)[:_SHOWN_KEYS])
     expected = ", ".join(repr(key) for key in sorted(_PARTS))
     return f": its keys are {keys}; expected {expected} or 'candidates'" if found else ""

@@ -97,6 +97,7 @@ def changed(**changes: Any) -> dict[str, Any]:
             "'throttle': expected .*, got 7 .*; input 'brake': expected .*, got 7 ",
         ),
         (changed(signals=[], parameters=[]), "'brake' is missing; parameter 'mass' is missing"),
+        ({"candidates": []}, "expected 'candidates' to be a list of objects, and not an empty one$"),
     ],
 )
 def test_what_is_wrong_is_told(reply: Any, problem: str) -> None:
