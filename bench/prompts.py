@@ -38,7 +38,7 @@ COMPARED = (*SYSTEMS, "AT51", "AT6a", "AFC27", "PulseMeter", "HeaterLimpHome", "
 SAMPLES = (0, 1, 5, 20)
 Array = NDArray[np.float64]
 _OSCILLATION = re.compile(r"oscillates from (\S+) to (\S+) s with period .*?, between (.*?) and (.*)")
-_WITHIN = re.compile(r" \(each value within (\S+)\)$")
+_WITHIN = re.compile(r" \(each value within (\S+); least \S+ at \S+ s, greatest \S+ at \S+ s\)$")
 
 
 @dataclass(frozen=True, slots=True)

@@ -63,13 +63,13 @@ def change_list(times: Array, column: Array, *, clock: int, label: Label = lambd
 
 
 def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda _, text: text) -> str:
-    """How often each value was entered, and its shortest stay.
+    """How often each value was entered, and its shortest stay; empty if it changed once at most.
 
     The first interval does not count as entered, and the last one is cut off by the end of the times.
     """
     found = _pieces(times, column)
     words = []
-    for value in sorted({value for value, _, _ in found}) if len(found) > 1 else ():
+    for value in sorted({value for value, _, _ in found}) if len(found) > 2 else ():
         entered = [(start, end) for v, start, end in found[1:] if v == value]
         complete = entered[:-1] if found[-1][0] == value else entered
         if complete:
@@ -192,7 +192,10 @@ def course(
         return text
     decimals = decimals_for(off, 2)
     # Rounded up: it is not less than it is told to be.
-    return f"{text} (each value within {plain(off + 0.5 * 10.0**-decimals, decimals)})"
+    within = f"each value within {plain(off + 0.5 * 10.0**-decimals, decimals)}"
+    ends = ((word, int(find(column))) for word, find in (("least", np.argmin), ("greatest", np.argmax)))
+    extremes = ", ".join(f"{word} {column[k]:.5g} at {plain(times[k], clock)} s" for word, k in ends)
+    return f"{text} ({within}; {extremes})"
 
 
 def breakpoints(

@@ -1,7 +1,7 @@
 """Everything observed in one sample: what broke or decided it, parts of the formula, signals over time."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -36,6 +36,8 @@ _SLOWEST_OSCILLATION = 1 / 20
 _CLOSE_SHARE = 1 / 12
 _CLOSE_PERIODS = 2.5
 CLOSE_TOLERANCE = 0.01
+# What changes by no more than this share of the robustness in that interval is not told there.
+_AT_REST = 0.01
 # Breakpoints of signals that the formula does not compare, and of samples that are told in short.
 _FEWER_BREAKPOINTS = 16
 # Steps of an input at which the course of an output always has a breakpoint, so that its response is seen.
@@ -46,6 +48,7 @@ _SIDES: Mapping[type[Formula], str] = {
     Implies: "condition and consequence",
     Iff: "sides",
 }
+_ROBUSTNESS = re.compile(r" robustness ([+-][^ ;]+)")
 _MARGIN = re.compile(r" by [^ ]+$")
 # Maximum number of signals that are not discrete over time; all that are compared come first.
 _MAX_SIGNALS = 16
@@ -58,6 +61,7 @@ class Observed:
     full: tuple[str, ...]
     short: tuple[str, ...]
     line: str
+    is_timed: bool = False  # whether what decided changed over time, so that its time tells something
 
 
 def observed(view: View, evaluation: Evaluation) -> Observed:
@@ -65,7 +69,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
 
     All of it tells what broke and what decided, the parts of the formula, when each predicate was false, all
     signals over time, and those that decided more exactly around that time. Less of it tells what decided,
-    the parts, all discrete signals, and what was compared there over time.
+    the parts, when each predicate was false, all discrete signals, and what was compared there over time.
     """
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     assert verdict is not None
@@ -75,23 +79,25 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     grid = view.experiment
     monitor = compiled(view.requirement.formula, grid.output_interval, grid.samples)
     diagnosis = monitor.diagnose(trajectory)
-    reasons = tuple(_reasons(verdict, diagnosis))
     over_time = monitor.courses(trajectory)
+    is_timed = bool(np.nanmax(margin := over_time[diagnosis.path[-1].formula]) > np.nanmin(margin))
+    reasons = tuple(_reasons(verdict, diagnosis, is_timed=is_timed))
     parts = tuple(_parts(view, diagnosis, over_time))
-    there = _values_there(view, trajectory, diagnosis)
-    predicates = _predicates(view, diagnosis, trajectory, over_time)
+    there = (_values_there(view, trajectory, diagnosis),) if is_timed else ()
+    predicates = tuple(_predicates(view, diagnosis, trajectory, over_time))
     inside = view.inside(trajectory)
     discrete = tuple(_discrete(view, inside))
     continuous = (*_continuous(view, evaluation, inside), *_close_up(view, inside, evaluation))
     few_courses = _continuous(view, evaluation, inside, of=_deciding(view, verdict))
     return Observed(
-        (*reasons, there, *parts, *discrete, *predicates, *continuous),
-        (*reasons, *parts, *discrete, *few_courses),
-        line,
+        (*reasons, *there, *parts, *discrete, *predicates, *continuous),
+        (*reasons, *parts, *discrete, *predicates, *few_courses),
+        "; ".join((line, *_margins(parts[:1]))),
+        is_timed,
     )
 
 
-def _reasons(verdict: Verdict, diagnosis: Diagnosis) -> Iterator[str]:
+def _reasons(verdict: Verdict, diagnosis: Diagnosis, *, is_timed: bool) -> Iterator[str]:
     """What broke, and what decided unless that is the same; the margin is the robustness, which is told."""
     breach = verdict.breach
     if breach is not None:
@@ -102,7 +108,8 @@ def _reasons(verdict: Verdict, diagnosis: Diagnosis) -> Iterator[str]:
             return
     *above, decider = (step.text for step in diagnosis.path if step.text)
     decided = "; ".join(above) + ": " * bool(above) + _MARGIN.sub("", decider)
-    yield " ".join((f"why: {decided}.", *(v.text for v in diagnosis.vacuities)))
+    always = [] if is_timed else ["So it was at all times."]
+    yield " ".join((f"why: {decided}.", *always, *(v.text for v in diagnosis.vacuities)))
 
 
 def _discrete(view: View, inside: Trajectory) -> Iterator[str]:
@@ -110,7 +117,7 @@ def _discrete(view: View, inside: Trajectory) -> Iterator[str]:
     for name in view.recorded:
         if name not in inside.columns or not view.is_discrete(name, inside[name]):
             continue
-        clock, label = _clock(view), partial(view.labelled, name)
+        clock, label = fine_clock(view), partial(view.labelled, name)
         yield f"{name}: {courses.change_list(inside.times, inside[name], clock=clock, label=label)}"
         stays = courses.dwell_list(inside.times, inside[name], clock=clock, label=label)
         if name in view.formula_outputs and stays:
@@ -140,7 +147,7 @@ def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> s
         decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
         told_value = view.labelled(name, value, plain(value, decimals))
         there.append(f"{name} = {in_unit(told_value, view.variable(name).unit)}")
-    time = plain(diagnosis.critical_time, _clock(view))
+    time = plain(diagnosis.critical_time, fine_clock(view))
     return f"{'all ' * (not view.untold)}signals at t = {time} s: {', '.join(there)}"
 
 
@@ -159,7 +166,14 @@ def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array])
             f"{side} robustness {in_unit(signed(over_time[side].item(sample), 4), _scale(view, side))}"
             for side in sides
         )
-        yield f"{_SIDES[kind]} at t = {plain(step.time, _clock(view))} s: {'; '.join(words)}"
+        yield f"{_SIDES[kind]} at t = {plain(step.time, fine_clock(view))} s: {'; '.join(words)}"
+
+
+def _margins(parts: Iterable[str]) -> Iterator[str]:
+    """The numbers of what is said of parts, for a line."""
+    for text in parts:
+        sides, _, words = text.partition(" at t = ")
+        yield f"{sides} {', '.join(_ROBUSTNESS.findall(words))}"
 
 
 def _scale(view: View, part: Formula) -> str:
@@ -176,7 +190,7 @@ def _predicates(
     Of the one that decided without being false all is told by then, and of those that compare nothing but a
     discrete signal whose changes are all listed.
     """
-    clock, step = _clock(view), trajectory.step
+    clock, step = fine_clock(view), trajectory.step
     listed = {
         name
         for name in view.recorded
@@ -268,21 +282,21 @@ def _close_up(view: View, inside: Trajectory, evaluation: Evaluation) -> Iterato
             continue
         near = close_up_times(view, inside.times, column, evaluation)
         part = column[near]
-        if np.ptp(part) == 0:
+        if np.ptp(part) <= _AT_REST * abs(verdict.robustness):
             continue
         visible = 10.0 ** -_decimals(view, column, name, verdict.robustness)
         claimed = CLOSE_TOLERANCE * float(np.ptp(part))
         told = courses.course(
             inside.times[near],
             part,
-            clock=_clock(view),
+            clock=fine_clock(view),
             # Less than is claimed if the margin would not be visible.
             tolerance=min(claimed, max(visible, _FINEST * float(np.ptp(part)))),
             claimed=claimed,
             slower_than=0.0,
             kept=(verdict.critical_time,),
         )
-        yield f"{name} around t = {plain(verdict.critical_time, _clock(view))} s: {told}"
+        yield f"{name} around t = {plain(verdict.critical_time, fine_clock(view))} s: {told}"
 
 
 def close_up_times(view: View, times: Array, column: Array, evaluation: Evaluation) -> NDArray[np.bool_]:
@@ -321,6 +335,6 @@ def _is_judged(view: View, name: str) -> bool:
     return name in view.requirement.formula.signals or name not in view.info
 
 
-def _clock(view: View) -> int:
+def fine_clock(view: View) -> int:
     """Decimals of times: enough for the output grid, because all times shown are sample times."""
     return max(decimals_for(view.space.stop_time, 4), decimals_for(view.experiment.output_interval, 1))

@@ -19,7 +19,7 @@ from falsifier.evaluation.levels import Climb
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import published
 from falsifier.llm.prompts.numbers import as_signals
-from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
+from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, fine_clock, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.standing import standing
 from falsifier.llm.prompts.view import Variant, View
@@ -40,12 +40,13 @@ _NAMED = 3
 _RUN = re.compile(r'"[^" ]+ x \d+"')
 _PENDING = "Proposed and not simulated so far:"
 _RUNS = '"0 x 187" among the values of a sample stands for 187 zeros.'
-_FIRST = {
-    "parameters": "The limits of the ranges are good first samples.",
-    "jumping": "One value throughout, and a single switch to another value, are good first samples.",
+_FIRST = "If what is said of the system suggests how a violation comes about, begin with that; otherwise, {}."
+_FIRST_OF = {
+    "parameters": "the limits of the ranges are good first samples",
+    "jumping": "one value throughout, and a single switch to another value, are good first samples",
     "inputs": (
-        "The limits of the ranges are good first samples, and so is a single switch from one limit to the "
-        "other."
+        "the limits of the ranges are good first samples, and so is a single switch from one limit to the "
+        "other"
     ),
 }
 _ON_OUTPUTS = "Use the output values of the earlier samples to work out how each {one} affects the outputs."
@@ -54,12 +55,12 @@ _ON_TIME = (
     "time move towards violating the requirement."
 )
 _ON_STRATEGY = (
-    "Do not just repeat the best sample with small changes: if samples stop improving, try a different "
-    "strategy{such}."
+    "As long as samples improve, go on from the best ones, or between two of them. If they stop improving, "
+    "do not just repeat the best one with small changes, but try a different strategy{such}."
 )
 _SUCH = (
     ", such as a single short pulse, a small amplitude, a slow change or a faster repetition; the limits of "
-    "the ranges are not always the worst"
+    "the ranges are not always the worst, as values just short of what the system reacts to may be"
 )
 _FLAT = (
     "The robustness is flat: it was {lowest} in all {count} samples, so its value gives no direction. Look "
@@ -82,6 +83,7 @@ class _Sample:
     robustness: float | None  # None: there is no verdict
     progress: SampleProgress = field(default_factory=SampleProgress)
     is_first: bool = False  # whether it was the first to reach something
+    is_timed: bool = False  # whether the time that decided tells something
 
 
 class Questions:
@@ -205,7 +207,8 @@ class Questions:
         waiting = ["; ".join(self._chosen(c)) for c in pending]
         if not self._samples and not waiting and not notes:
             kind = "jumping" if self._only_jumps else "inputs"
-            first = f"{_FIRST[kind if self._view.space.inputs else 'parameters']} " if is_own else ""
+            samples = _FIRST_OF[kind if self._view.space.inputs else "parameters"]
+            first = f"{_FIRST.format(samples)} " if is_own else ""
             if budget is not None:
                 first += f"Nothing has been simulated yet; {counted(budget, 'simulation')} may be spent. "
             yield f"{first}Propose the first {wanted}."
@@ -219,7 +222,8 @@ class Questions:
             yield "\n".join((_PENDING, *waiting))
         if is_own and self._judged:
             what = self._view.chosen
-            on_time = [] if self._is_flat() else [_ON_TIME.format(what=what)]
+            is_timed = not self._is_flat() and any(s.is_timed for s in self._judged)
+            on_time = [_ON_TIME.format(what=what)] if is_timed else []
             on_strategy = _ON_STRATEGY.format(such="" if self._only_jumps else _SUCH)
             yield "\n".join((_ON_OUTPUTS.format(one=what[:-1]), *on_time, on_strategy))
         if is_own and _RUN.search(self._lasting()):
@@ -231,7 +235,7 @@ class Questions:
         ranked, levels = self._best_first(), self._climb.levels
         if len(ranked) < 2:
             return
-        named = listed([f"sample {s.number}" for s in ranked[:_NAMED]])
+        named = listed([f"sample {s.number}" for s in ranked[: min(_NAMED, len(ranked) - 1)]])
         if self._is_flat():
             yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations)
             if len({self._reached.rank(s.progress) for s in ranked}) > 1:
@@ -277,6 +281,7 @@ class Questions:
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         trajectory = evaluation.trajectory
         progress = SampleProgress.of(self._view, trajectory) if trajectory else SampleProgress()
+        switches = self._reached.switches(progress, trajectory, fine_clock(self._view)) if trajectory else ""
         news = self._reached.news(progress)
         self._climb.add(self._told, verdict, trajectory, self._view.requirement.formula.predicates)
         found = observed(self._view, evaluation)
@@ -284,16 +289,19 @@ class Questions:
         if is_on_limit(verdict.robustness):
             robustness += f" ({margin_words(verdict.robustness, verdict.predicate)})"
         head = (robustness, doubt, *notes, f"the first to reach: {', '.join(news)}" if news else "")
+        first = f"first changes: {switches}" if switches else ""
         brief = inputs if why else as_signals(self._view, candidate, in_brief=True)
         texts = (
-            _text(inputs, *head, *found.full),
-            _text(inputs, *head, *found.short),
+            _text(inputs, *head, first, *found.full),
+            _text(inputs, *head, first, *found.short),
             _text(brief, *head, found.line),
         )
         best = min((s.robustness for s in self._judged if s.robustness is not None), default=None)
         depth = _FULL if news or best is None or verdict.robustness < best else _SHORT
         tokens = tuple(map(self._count, texts))
-        return _Sample(self._told, texts, tokens, depth, verdict.robustness, progress, bool(news))
+        return _Sample(
+            self._told, texts, tokens, depth, verdict.robustness, progress, bool(news), found.is_timed
+        )
 
     def _alike(self, inputs: str) -> str:
         """That a sample looks like an earlier one, if it does: numbers are rounded."""

@@ -1,5 +1,7 @@
 """Signals over time in words; what is stated of their accuracy is computed here from the text."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -43,7 +45,8 @@ def test_dwell_list_names_the_shortest_stay_after_an_entry() -> None:
         "3: entered once, shortest stay 0.64 s from 4.36 s",
         "4: entered at 7 s and still held at 10 s",
     ]
-    assert "1: never entered again" in dwell_list(TIMES, steps((0, 1), (2, 2)), clock=2)
+    assert "1: never entered again" in dwell_list(TIMES, steps((0, 1), (2, 2), (3, 3)), clock=2)
+    assert dwell_list(TIMES, steps((0, 1), (2, 2)), clock=2) == "", "the list of changes tells as much"
 
 
 @pytest.mark.parametrize("name", ["AT1", "AT51", "CC4", "NN", "SC", "F16", "PulseMeter"])
@@ -66,6 +69,12 @@ def test_a_course_that_needs_more_points_says_how_exact_it_is() -> None:
     claimed = 0.02 * float(np.ptp(wild))
     text = course(TIMES, wild, clock=2, tolerance=claimed, slower_than=0.0, most=6)
     points, _, within = text.removesuffix(")").partition(" (each value within ")
+    within, *extremes = re.split(", |; ", within)
+    lowest, highest = int(wild.argmin()), int(wild.argmax())
+    assert extremes == [
+        f"least {wild[lowest]:.5g} at {TIMES[lowest]:g} s",
+        f"greatest {wild[highest]:.5g} at {TIMES[highest]:g} s",
+    ]
     error = np.abs(np.interp(TIMES, *drawn_points(points)) - wild).max()
     assert claimed < error <= float(within) <= 2 * error
 

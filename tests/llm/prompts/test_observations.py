@@ -136,13 +136,30 @@ def test_a_predicate_is_judged_only_when_the_requirement_asks_for_it() -> None:
 
 
 def test_courses_and_changes_end_where_the_requirement_stops_looking() -> None:
-    lines = facts(*seen("G[0,3] F[0,3] (x <= 9)", np.where(TIMES < 4.05, 1.0, 2.0) + (TIMES > 7)))
-    assert line(lines, "x: ") == "x: 1, then 2 from 4.1 s"
+    lines = facts(
+        *seen("G[0,3] F[0,3] (x <= 9)", np.where(TIMES > 2, 1.0, 0.0) + (TIMES > 4.05) + (TIMES > 7))
+    )
+    assert line(lines, "x: ") == "x: 0, then 1 from 2.1 s, 2 from 4.1 s"
     assert line(lines, "x stays: ").endswith("2: entered at 4.1 s and still held at 6 s")
     over_time, around = courses(*seen("G[2,6] (x <= 9)", TIMES.copy()))
     assert (over_time, around.split()[-1]) == ("x: 0:0 6:6", "6:6")
     (only,) = courses(*seen("x <= 9", TIMES.copy()))
     assert only == "x: constant 0"
+
+
+def test_the_time_that_decided_is_left_out_where_all_times_would_have() -> None:
+    view, evaluation = seen("G[0,10] (x <= 2)", np.ones_like(TIMES))
+    assert facts(view, evaluation) == [
+        "why: G over [0, 10] s was lowest at 0 s: x = 1 is below 2. So it was at all times.",
+        "x: constant 1",
+    ]
+    assert not observed(view, evaluation).is_timed
+    assert observed(*seen("G[0,10] (x <= 9)", TIMES.copy())).is_timed
+
+
+def test_a_line_tells_the_margins_of_the_parts() -> None:
+    told = observed(*seen("G[0,10] (x <= 12) or G[0,10] (x <= 9)", TIMES.copy()))
+    assert told.line == "decided at t = 10 s by x <= 12; alternatives +2, -1"
 
 
 @pytest.mark.parametrize(("jumps", "is_told"), [(5, False), (20, True)])

@@ -1,5 +1,6 @@
 """What changes from question to question: samples as they were told first, and what is new."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -128,11 +129,13 @@ def test_on_a_plateau_samples_rank_by_what_their_signals_did() -> None:
     problem = transmission("AT51")[0]
     still, brisk = [0.0] * 7 + [325.0] * 3, [100.0] * 7 + [0.0] * 3
     _, changing = told(problem, "MP5", sampled(problem, still, brisk, [0.0] * 7 + [300.0] * 3))
-    assert "flat: it was +0.5 in all 3 samples" in changing and "these got furthest: sample 2, " in changing
+    assert (
+        "flat: it was +0.5 in all 3 samples" in changing and "these got furthest: sample 2 and " in changing
+    )
     assert "the first to reach: gear 2, gear 3, gear 4" in changing and "Look at the time" not in changing
     assert "got furthest" not in told(problem, "MP5", sampled(problem, still, still))[1], "both are the same"
     _, other = told(PROBLEM, "MP5", sampled(PROBLEM, [0.0] * 5, [0.5] * 5))
-    assert "flat" not in other and "Lowest robustness so far: sample 2 and sample 1." in other
+    assert "flat" not in other and "Lowest robustness so far: sample 2." in other
 
 
 def test_failed_samples_rationales_lessons_and_inputs_that_look_alike() -> None:
@@ -172,6 +175,16 @@ def test_doubts_are_told_and_the_budget_by_own_variants_only(variant: str) -> No
     assert ("30 simulations" in text and "; at t = 0:" in text) == (variant in ("MP5", "MP6"))
 
 
+def test_first_changes_of_discrete_signals_are_told_once_with_the_other_signals() -> None:
+    still, brisk = [0.0] * 7 + [325.0] * 3, [100.0] * 7 + [0.0] * 3
+    problem = transmission("AT51")[0]
+    _, changing = told(problem, "MP5", sampled(problem, still, brisk, [90.0] * 7 + [0.0] * 3))
+    (line,) = re.findall("first changes: (.*)", changing)
+    first, *later = line.split("; ")
+    assert re.fullmatch(r"gear 1 -> 2 at \S+ s \(speed \S+, rpm \S+\)", first)
+    assert [change.partition(" at ")[0] for change in later] == ["gear 2 -> 3", "gear 3 -> 4"]
+
+
 def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> None:
     problem = lag_problem("G[0,10] (x <= 0.9)")
     mode = Variable("x", kind="enumeration", literals={"Idle": 0, "Run": 1})
@@ -181,13 +194,12 @@ def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> Non
     assert view.labelled("x", 1.0, "1") == "1 (Run)" and view.labelled("x", 7.0, "7") == "7"
     evaluation = evaluate(problem, problem.space.decode([0] * 4))
     assert evaluation.trajectory is not None
-    steps = (evaluation.trajectory.times >= 5).astype(float)
+    times = evaluation.trajectory.times
+    steps = ((times >= 5) & (times < 8)).astype(float)
     changed = replace(
         evaluation, trajectory=replace(evaluation.trajectory, columns={"x": steps, "u": 0 * steps})
     )
     standing, changing = told(view, "MP5", [changed], start={"x": (0.0, 0.0)})
     assert "- x, 0 = Idle, 1 = Run; at t = 0: 0 (Idle)" in standing
-    assert "x: 0 (Idle), then 1 (Run) from 5 s" in changing
-    assert (
-        "x stays: 0 (Idle): never entered again; 1 (Run): entered at 5 s and still held at 10 s" in changing
-    )
+    assert "x: 0 (Idle), then 1 (Run) from 5 s, 0 (Idle) from 8 s" in changing
+    assert "x stays: 0 (Idle): entered at 8 s and still held at 10 s; 1 (Run): entered once, " in changing

@@ -45,7 +45,8 @@ def test_variants_only_add_parts_up_to_mp4() -> None:
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_what_a_violation_is_and_ranges_are_told(variant: str) -> None:
     text = standing(transmission()[0], variant)
-    assert ("> forbids its limit" if variant in ("MP5", "MP6") else "below 0 the specification") in text
+    own = variant in ("MP5", "MP6")
+    assert ("below 0 is a violation" if own else "below 0 the specification") in text
     assert "from 0 to 325" in text
     assert "\n\n\n" not in text, "what is not told leaves no trace"
 
@@ -216,10 +217,22 @@ class TestAdvice:
     def test_any_conjunct_is_enough_where_there_are_some(self, formula: str, *, is_one: bool) -> None:
         assert ("any one of its conjuncts" in self.lines(formula)) is is_one
 
+    @pytest.mark.parametrize(
+        ("formula", "told"),
+        [
+            ("G[0,9] (x <= 0.9 or x >= 2)", "only where all its alternatives fail together"),
+            ("G[0,5] F[1,3] (x <= 0.9)", "violated if x <= 0.9 stays false for 2 s in one piece"),
+            ("F[1,3] (x <= 0.9)", ""),
+        ],
+    )
+    def test_what_must_fail_together_or_for_long(self, formula: str, told: str) -> None:
+        text = self.lines(formula)
+        assert told in text and bool(told) == ("together" in text or "in one piece" in text)
+
     def test_on_shapes_conditions_and_units_where_they_matter(self) -> None:
         plain = self.lines("G[0,10] (x <= 0.9)")
         assert "pulses" in self.lines("G[0,10] (x <= 0.9)", free=True) and "pulses" not in plain
-        assert "make the condition true first" in self.lines("G[0,10] (u >= 0.5 -> x <= 0.9)")
+        assert "make the condition true, or keep" in self.lines("G[0,10] (u >= 0.5 -> x <= 0.9)")
         assert "condition" not in plain
         assert "in the units of their signals" in standing(load_problem("AT6a"))
         assert "in the units of their signals" not in standing(load_problem("AT1"))
