@@ -121,14 +121,15 @@ def runs(values: Sequence[float]) -> str:
 
 
 def as_signals(view: View, candidate: Candidate, *, in_brief: bool = False) -> tuple[str, ...]:
-    """Each input with its own control points and interpolation, and parameters.
+    """Each input with its own control points and interpolation, inputs that do the same together; parameters.
 
     In brief, signals of many pieces are only described.
     """
-    lines = []
+    alike: dict[str, list[str]] = {}
     for r in view.space.inputs:
         told = _signal_text_in(r, candidate.signals[r.name], view.space.stop_time, in_brief=in_brief)
-        lines.append(f"{r.name}: {told}")
+        alike.setdefault(told, []).append(r.name)
+    lines = [f"{', '.join(names)}: {told}" for told, names in alike.items()]
     for p in view.space.parameters:
         lines.append(f"{p.name} = {chosen(p, candidate.parameters[p.name], _DIGITS_OF_PARAMETER)}")
     return tuple(lines)

@@ -198,8 +198,17 @@ def _choice(view: View) -> Iterator[str]:
     yield (
         f"You choose the following. The simulation runs from 0 to {number(view.space.stop_time)} s{looked}."
     )
+    alike: dict[str, list[InputRange]] = {}
     for r in view.space.inputs:
-        yield _input(view, r) + _in_files(view, r.name)
+        alike.setdefault(_manner(view, r), []).append(r)
+    for manner, inputs in alike.items():
+        begin, end = "- input signal ", f"; {manner}"
+        if len(inputs) > 1:
+            yield f"- {len(inputs)} input signals, each {manner}:"
+            begin, end = "  - ", ""
+        for r in inputs:
+            what = with_unit(r.name, r.unit)
+            yield f"{begin}{what}{_described(r.description)}{end}{_in_files(view, r.name)}"
     yield from _freedom(view)
     for p in view.space.parameters:
         nominal = "" if p.nominal is None else f", nominally {number(p.nominal)}"
@@ -214,8 +223,9 @@ def _horizon(view: View) -> str:
     return number(view.looked_at, 6) if view.looked_at < view.space.stop_time else ""
 
 
-def _input(view: View, r: InputRange) -> str:
-    parts = [f"- input signal {with_unit(r.name, r.unit)}{_described(r.description)}", _values(r)]
+def _manner(view: View, r: InputRange) -> str:
+    """What values an input may have, and when."""
+    parts = [_values(r)]
     if r.control_points == 1:
         parts.append("one value for the whole time")
     else:

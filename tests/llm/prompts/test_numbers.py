@@ -41,6 +41,12 @@ def test_signals_are_told_with_their_own_control_points() -> None:
     )
 
 
+def test_inputs_that_do_the_same_are_told_together() -> None:
+    constant = Signal((0.0,), (-0.5,), "constant")
+    alike = as_signals(VIEW, Candidate({"u": constant, "v": constant}, {"x0": 0.25}))
+    assert alike == ("u, v: constant -0.5", "x0 = 0.25")
+
+
 def test_in_brief_a_signal_of_many_pieces_is_only_described() -> None:
     times = [0.0, 2.5, *(2.5 + 0.25 * k for k in range(1, 30))]
     signal = Signal(tuple(times), tuple(float(k % 2) for k in range(31)), "constant")

@@ -14,6 +14,7 @@ from falsifier.core.model import Variable
 from falsifier.core.ranges import ParameterRange
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import with_unit
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm import DEFAULT_VARIANT
@@ -236,6 +237,17 @@ class TestAdvice:
         assert "condition" not in plain
         assert "in the units of their signals" in standing(load_problem("AT6a"))
         assert "in the units of their signals" not in standing(load_problem("AT1"))
+
+
+def test_inputs_that_are_chosen_alike_share_what_is_said_of_that() -> None:
+    view = View.of(lag_problem())
+    (u,) = view.space.inputs
+    others = (replace(u, name="w", high=7.0), replace(u, name="v", unit="bar", description="Pressure"))
+    text = standing(replace(view, space=replace(view.space, inputs=(u, *others))))
+    shared, first, second, other = text.partition("You choose the following.")[2].splitlines()[1:5]
+    assert shared.startswith("- 2 input signals, each from -1 to 1; 4 control points at t")
+    assert (first, second) == (f"  - {with_unit(u.name, u.unit)}", "  - v [bar]: Pressure")
+    assert other.startswith("- input signal w") and "from -1 to 7; 4 control points" in other
 
 
 def test_only_mp6_tells_context() -> None:
