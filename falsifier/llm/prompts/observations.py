@@ -14,6 +14,7 @@ from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts import courses
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import coarse_clock, column_decimals, decimals_for, number, plain
+from falsifier.llm.prompts.together import longest_failure, near_misses
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Verdict
 from falsifier.stl.diagnosis import links
@@ -62,6 +63,7 @@ class Observed:
     short: tuple[str, ...]
     line: str
     is_timed: bool = False  # whether what decided changed over time, so that its time tells something
+    failure: float = 0.0  # s for which what must recur failed in one piece; 0 if nothing must
 
 
 def observed(view: View, evaluation: Evaluation) -> Observed:
@@ -83,8 +85,14 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     is_timed = bool(np.nanmax(margin := over_time[diagnosis.path[-1].formula]) > np.nanmin(margin))
     reasons = tuple(_reasons(verdict, diagnosis, is_timed=is_timed))
     parts = tuple(_parts(view, diagnosis, over_time))
-    there = (_values_there(view, trajectory, diagnosis),) if is_timed else ()
-    predicates = tuple(_predicates(view, diagnosis, trajectory, over_time))
+    there = (_values_at(view, trajectory, verdict.critical_time, verdict.robustness),) if is_timed else ()
+    predicates = [
+        *_predicates(view, diagnosis, trajectory, over_time),
+        *_nearest(view, trajectory, over_time),
+    ]
+    if failure := longest_failure(view.requirement.formula, trajectory.times, over_time):
+        values = _values_at(view, trajectory, failure[1], verdict.robustness)
+        predicates.append(f"at the end of the longest failure in one piece, {values}")
     inside = view.inside(trajectory)
     discrete = tuple(_discrete(view, inside))
     continuous = (*_continuous(view, evaluation, inside), *_close_up(view, inside, evaluation))
@@ -94,6 +102,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
         (*reasons, *parts, *discrete, *predicates, *few_courses),
         "; ".join((line, *_margins(parts[:1]))),
         is_timed,
+        failure[1] - failure[0] if failure else 0.0,
     )
 
 
@@ -138,17 +147,25 @@ def _continuous(
         yield f"{name}: {_drawn(view, name, inside, column, steps if name in compared else (), most)}"
 
 
-def _values_there(view: View, trajectory: Trajectory, diagnosis: Diagnosis) -> str:
+def _values_at(view: View, trajectory: Trajectory, time: float, robustness: float) -> str:
     there = []
     told = {*view.recorded, *(r.name for r in view.space.inputs), *(v.name for v in view.info.inputs)}
-    for name, value in trajectory.at(diagnosis.critical_time).items():
+    for name, value in trajectory.at(time).items():
         if name not in told:  # a search may record more
             continue
-        decimals = _decimals(view, trajectory[name], name, diagnosis.robustness)
+        decimals = _decimals(view, trajectory[name], name, robustness)
         told_value = view.labelled(name, value, plain(value, decimals))
         there.append(f"{name} = {in_unit(told_value, view.variable(name).unit)}")
-    time = plain(diagnosis.critical_time, fine_clock(view))
-    return f"{'all ' * (not view.untold)}signals at t = {time} s: {', '.join(there)}"
+    all_of_them = "all " * (not view.untold)
+    return f"{all_of_them}signals at t = {plain(time, fine_clock(view))} s: {', '.join(there)}"
+
+
+def _nearest(view: View, trajectory: Trajectory, over_time: Mapping[Formula, Array]) -> Iterator[str]:
+    """How close others came to failing while one of those failed that must fail together."""
+    for miss in near_misses(view.requirement.formula, over_time):
+        time = plain(trajectory.times[miss.sample], fine_clock(view))
+        words = (_part_text(view, other, over_time, miss.sample) for other in miss.others)
+        yield f"nearest to a violation while {miss.while_so}, at t = {time} s: {'; '.join(words)}"
 
 
 def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[str]:
@@ -162,11 +179,12 @@ def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array])
             continue
         sides = links(step.formula) if isinstance(step.formula, And | Or) else step.formula.children
         sample = round(step.time / view.experiment.output_interval)
-        words = (
-            f"{side} robustness {in_unit(signed(over_time[side].item(sample), 4), _scale(view, side))}"
-            for side in sides
-        )
+        words = (_part_text(view, side, over_time, sample) for side in sides)
         yield f"{_SIDES[kind]} at t = {plain(step.time, fine_clock(view))} s: {'; '.join(words)}"
+
+
+def _part_text(view: View, part: Formula, over_time: Mapping[Formula, Array], sample: int) -> str:
+    return f"{part} robustness {in_unit(signed(over_time[part].item(sample), 4), _scale(view, part))}"
 
 
 def _margins(parts: Iterable[str]) -> Iterator[str]:

@@ -18,10 +18,11 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import published
-from falsifier.llm.prompts.numbers import as_signals
+from falsifier.llm.prompts.numbers import as_signals, number
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, fine_clock, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.standing import standing
+from falsifier.llm.prompts.tried import Tried
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.llm.usage import count_tokens
 from falsifier.stl.margins import is_on_limit, margin_words, signed
@@ -35,7 +36,7 @@ USUAL_PROMPT_TOKENS = 6_000
 _MOST_OF_SAMPLES, _SHORTENED, _MOST_OF_LINES = 0.7, 0.45, 0.6
 # Characters of a rationale that are told back.
 _LONGEST_WHY = 300
-# Samples that are named as the best ones, or the ones that got furthest.
+# Samples that are named as the best ones.
 _NAMED = 3
 _RUN = re.compile(r'"[^" ]+ x \d+"')
 _PENDING = "Proposed and not simulated so far:"
@@ -43,10 +44,12 @@ _RUNS = '"0 x 187" among the values of a sample stands for 187 zeros.'
 _FIRST = "If what is said of the system suggests how a violation comes about, begin with that; otherwise, {}."
 _FIRST_OF = {
     "parameters": "the limits of the ranges are good first samples",
-    "jumping": "one value throughout, and a single switch to another value, are good first samples",
+    "jumping": (
+        "go once through all values, each held for long enough, which shows what the system does with them"
+    ),
     "inputs": (
-        "the limits of the ranges are good first samples, and so is a single switch from one limit to the "
-        "other"
+        "the limits of the ranges are good first samples, and so are steps that are far apart, or a slow run "
+        "through a whole range, which show how and where the system reacts"
     ),
 }
 _ON_OUTPUTS = "Use the output values of the earlier samples to work out how each {one} affects the outputs."
@@ -62,11 +65,7 @@ _SUCH = (
     ", such as a single short pulse, a small amplitude, a slow change or a faster repetition; the limits of "
     "the ranges are not always the worst, as values just short of what the system reacts to may be"
 )
-_FLAT = (
-    "The robustness is flat: it was {lowest} in all {count} samples, so its value gives no direction. Look "
-    "instead at how close a condition came to being true, how briefly a discrete value was held, and how far "
-    "a signal was from its switching point."
-)
+_FLAT = "The robustness is flat: it was {lowest} in all {count} samples, so its value gives no direction."
 
 # How much of a sample is told.
 _FULL, _SHORT, _LINE = range(3)
@@ -84,6 +83,7 @@ class _Sample:
     progress: SampleProgress = field(default_factory=SampleProgress)
     is_first: bool = False  # whether it was the first to reach something
     is_timed: bool = False  # whether the time that decided tells something
+    failure: float = 0.0  # s for which what must recur failed in one piece
 
 
 class Questions:
@@ -112,6 +112,7 @@ class Questions:
         self._told = self._omitted = 0
         self._inputs: dict[str, int] = {}
         self._reached = Reached(view)
+        self._tried = Tried(view)
         self._only_jumps = all(r.kind != "real" for r in view.space.inputs)
         self._climb = Climb(_counting(view), "sample")
 
@@ -231,20 +232,23 @@ class Questions:
         yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
 
     def _standings(self) -> Iterator[str]:
-        """Which samples are the best, or got furthest; where robustness says little, what is missing."""
+        """Which samples are the best; where robustness says little, what is missing and was not tried."""
         ranked, levels = self._best_first(), self._climb.levels
         if len(ranked) < 2:
             return
-        named = listed([f"sample {s.number}" for s in ranked[: min(_NAMED, len(ranked) - 1)]])
         if self._is_flat():
             yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations)
-            if len({self._reached.rank(s.progress) for s in ranked}) > 1:
-                yield f"By what the recorded signals did, these got furthest: {named}."
         else:
-            yield f"Lowest robustness so far: {named}."
+            better = [f"sample {s.number}" for s in ranked[:_NAMED] if s.robustness != ranked[-1].robustness]
+            yield f"Lowest robustness so far: {listed(better)}."
+        if any(s.failure for s in self._judged):
+            longest = max(self._judged, key=lambda s: s.failure)
+            yield f"Longest in one piece so far: {number(longest.failure)} s, in sample {longest.number}."
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
             yield "\n".join((*few, *self._climb.lines))
+        if self._climb.is_told or self._is_flat():
+            yield from (text for text in (self._reached.unmoved, self._tried.text) if text)
 
     def _is_flat(self) -> bool:
         """Whether several samples had the same robustness, and none had another."""
@@ -280,6 +284,7 @@ class Questions:
             text = _text(inputs, ended, *notes)
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         trajectory = evaluation.trajectory
+        self._tried.add(candidate)
         progress = SampleProgress.of(self._view, trajectory) if trajectory else SampleProgress()
         switches = self._reached.switches(progress, trajectory, fine_clock(self._view)) if trajectory else ""
         news = self._reached.news(progress)
@@ -288,19 +293,28 @@ class Questions:
         robustness = f"robustness {signed(verdict.robustness, ROBUSTNESS_DIGITS)}"
         if is_on_limit(verdict.robustness):
             robustness += f" ({margin_words(verdict.robustness, verdict.predicate)})"
-        head = (robustness, doubt, *notes, f"the first to reach: {', '.join(news)}" if news else "")
-        first = f"first changes: {switches}" if switches else ""
+        reached = f"the first to reach: {', '.join(news)}" if news else ""
+        head = (robustness, doubt, *notes, reached, f"new changes: {switches}" if switches else "")
         brief = inputs if why else as_signals(self._view, candidate, in_brief=True)
         texts = (
-            _text(inputs, *head, first, *found.full),
-            _text(inputs, *head, first, *found.short),
+            _text(inputs, *head, *found.full),
+            _text(inputs, *head, *found.short),
             _text(brief, *head, found.line),
         )
         best = min((s.robustness for s in self._judged if s.robustness is not None), default=None)
-        depth = _FULL if news or best is None or verdict.robustness < best else _SHORT
+        is_first = bool(news or switches)
+        depth = _FULL if is_first or best is None or verdict.robustness < best else _SHORT
         tokens = tuple(map(self._count, texts))
         return _Sample(
-            self._told, texts, tokens, depth, verdict.robustness, progress, bool(news), found.is_timed
+            self._told,
+            texts,
+            tokens,
+            depth,
+            verdict.robustness,
+            progress,
+            is_first,
+            found.is_timed,
+            found.failure,
         )
 
     def _alike(self, inputs: str) -> str:

@@ -1,7 +1,7 @@
 """How far the recorded signals of a sample got, which says more than a robustness that is flat."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import fsum
@@ -17,11 +17,11 @@ from falsifier.llm.prompts.view import View
 Stage = tuple[str, float | None, float]
 
 # A signal went further if it left the range seen so far by more than this share of it.
-_FURTHER = 0.1
-# Changes of a signal that chatters are not listed, nor more than so many things that are new.
-_MOST_NEW = 8
-# Times of first changes that are told, and signals that are told at each.
-_MOST_SWITCHES, _MOST_BESIDE = 6, 6
+_FURTHER = 0.05
+# New things that are told, of these those of one signal, and times of new changes.
+_MOST_NEW, _MOST_OF_ONE, _MOST_SWITCHES = 8, 3, 8
+# Outputs and inputs that are told at each new change.
+_MOST_BESIDE = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,7 @@ class SampleProgress:
 
     stages: frozenset[Stage] = frozenset()
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    # Changes by the index at which each came first, unless another signal repeated one of its changes there.
+    # Changes by the index at which each came first.
     changes: Mapping[int, tuple[Stage, ...]] = field(default_factory=dict)
 
     @classmethod
@@ -39,7 +39,6 @@ class SampleProgress:
         columns = view.inside(trajectory).columns
         stages: set[Stage] = set()
         changes: dict[int, tuple[Stage, ...]] = {}
-        repeated: set[int] = set()
         ranges = {}
         for name in (name for name in view.recorded if name in columns):
             column = columns[name]
@@ -48,14 +47,12 @@ class SampleProgress:
                 stages |= {(name, None, value) for value in column[begun].tolist()}
                 for before, k in pairwise(begun):
                     change = (name, float(column[before]), float(column[k]))
-                    if change in stages:
-                        repeated.add(k)
-                    stages.add(change)
-                    changes[k] = (*changes.get(k, ()), change)
+                    if change not in stages:
+                        stages.add(change)
+                        changes[k] = (*changes.get(k, ()), change)
             elif np.isfinite(column).all():
                 ranges[name] = (float(column.min()), float(column.max()))
-        firsts = {k: changes[k] for k in sorted(changes) if k not in repeated}
-        return cls(frozenset(stages), ranges, firsts)
+        return cls(frozenset(stages), ranges, dict(sorted(changes.items())))
 
 
 class Reached:
@@ -67,9 +64,13 @@ class Reached:
         self._ranges: dict[str, tuple[float, float]] = {}
 
     def news(self, progress: SampleProgress) -> tuple[str, ...]:
-        """Add a sample; return what no earlier one did, in words; of the first one nothing."""
+        """Add a sample; return the values that no earlier one reached, in words; of the first one nothing."""
+        values = sorted(
+            (name, value) for name, before, value in progress.stages - self._stages.keys() if before is None
+        )
         is_begun = self._stages or self._ranges
-        found = [*self._new_stages(progress), *self._further(progress)] if is_begun else []
+        new = self._few([(name, None, value) for name, value in values])
+        found = [*map(self._stage, new), *self._further(progress)] if is_begun else []
         self._stages.update(progress.stages)
         for name, (low, high) in progress.ranges.items():
             least, most = self._ranges.get(name, (low, high))
@@ -81,14 +82,40 @@ class Reached:
 
         It is to be called before the sample is added; ``clock`` is the number of decimals of times.
         """
+        new = {k: [c for c in changes if c not in self._stages] for k, changes in progress.changes.items()}
+        few = self._few([change for changes in new.values() for change in changes])
+        inputs = [r.name for r in self._view.space.inputs if r.name in trajectory.columns]
+        names = [*list(progress.ranges)[:_MOST_BESIDE], *(inputs if len(inputs) <= _MOST_BESIDE else ())]
+        columns = {name: trajectory[name] for name in names}
         told = []
-        for k, changes in progress.changes.items() if progress.ranges else ():
-            if not self._stages.keys() & set(changes):
-                columns = {name: trajectory[name] for name in list(progress.ranges)[:_MOST_BESIDE]}
-                beside = (f"{n} {plain(float(c[k]), column_decimals(c))}" for n, c in columns.items())
+        for k, changes in new.items():
+            if kept := [self._stage(change) for change in changes if change in few]:
+                beside = (
+                    f"{n} {self._view.labelled(n, float(c[k]), plain(float(c[k]), column_decimals(c)))}"
+                    for n, c in columns.items()
+                )
                 time = f"at {plain(trajectory.times[k], clock)} s"
-                told.append(f"{', '.join(map(self._stage, changes))} {time} ({', '.join(beside)})")
+                told.append(f"{', '.join(kept)} {time}" + (f" ({', '.join(beside)})" if columns else ""))
         return "; ".join((*told[:_MOST_SWITCHES], *(["..."] if len(told) > _MOST_SWITCHES else [])))
+
+    @property
+    def unmoved(self) -> str:
+        """Which signals were the same in all samples; empty if none was."""
+        moved = {name for name, before, _ in self._stages if before is not None}
+        moved |= {name for name, (low, high) in self._ranges.items() if low < high}
+        values = Counter(name for name, before, _ in self._stages if before is None)
+        known = [n for n in self._view.recorded if n in values or n in self._ranges]
+        same = [name for name in known if name not in moved and values[name] < 2]
+        return f"The same in all samples: {', '.join(same)}." if same else ""
+
+    @staticmethod
+    def _few(stages: Sequence[Stage]) -> list[Stage]:
+        """Of each signal its first stages and its last one: of a counter, not all."""
+        by_name: dict[str, list[Stage]] = {}
+        for stage in stages:
+            by_name.setdefault(stage[0], []).append(stage)
+        few = (found[: _MOST_OF_ONE - 1] + found[_MOST_OF_ONE - 1 :][-1:] for found in by_name.values())
+        return [stage for found in few for stage in found]
 
     def rank(self, progress: SampleProgress) -> tuple[float, float]:
         """How far a sample got: its stages, of which rare ones count more; then the share of all ranges."""
@@ -100,10 +127,6 @@ class Reached:
         ]
         rarity = fsum(1.0 / self._stages[stage] for stage in progress.stages)
         return rarity, sum(shares) / len(shares) if shares else 0.0
-
-    def _new_stages(self, progress: SampleProgress) -> Iterator[str]:
-        new = progress.stages - self._stages.keys()
-        yield from map(self._stage, sorted(new, key=lambda s: (s[0], s[1] is not None, s[1] or 0.0, s[2])))
 
     def _stage(self, stage: Stage) -> str:
         name, before, value = stage

@@ -13,6 +13,7 @@ from falsifier.context.values import Context
 from falsifier.core.ranges import Freedom, InputRange, ParameterRange
 from falsifier.core.words import counted, listed, with_unit
 from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain
+from falsifier.llm.prompts.together import inside_always, recurring
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl import Formula, in_words
 from falsifier.stl.formula import Always, And, Eventually, Iff, Implies, Next, Not, Or, Predicate, Until
@@ -288,16 +289,13 @@ def _in_files(view: View, name: str) -> str:
 def _advice(view: View) -> Iterator[str]:
     """Advice that fits how the requirement is built and what is chosen, from the first sample to the last."""
     formula = view.requirement.formula
-    inner = formula
-    while isinstance(inner, Always):
-        inner = inner.operand
+    inner = inside_always(formula)
     if isinstance(inner, And):
         yield _CONJUNCTION
     if isinstance(inner, Or):
         yield _DISJUNCTION
-    if isinstance(inner, Eventually) and inner.window and inner is not formula:
-        length = number(inner.window.end - inner.window.start)
-        yield _RECURRENCE.format(condition=formula_text(inner.operand), length=length)
+    if found := recurring(formula):
+        yield _RECURRENCE.format(condition=formula_text(found[0]), length=number(found[1]))
     if len(formula.predicates) > 1 and len({view.variable(name).unit for name in formula.signals}) > 1:
         yield _UNITS
     if any(isinstance(part, Implies) for part in formula.walk()):

@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 
 from falsifier.core.model import ModelInfo, Variable
+from falsifier.core.ranges import InputRange, ParameterRange
+from falsifier.core.space import SearchSpace
+from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import VARIANTS, Questions, View
 from falsifier.llm.prompts.reached import Reached, SampleProgress
+from falsifier.llm.prompts.tried import Tried
 from falsifier.llm.usage import count_tokens
 from falsifier.problem.problem import Problem
 from falsifier.testing import FREE, START, lag_problem
@@ -69,7 +73,7 @@ def test_a_long_history_is_shortened_rarely_and_keeps_what_matters() -> None:
     assert kept.count(False) <= len(kept) // 3
     text = messages[1].content
     assert all(f"Sample {n}: throttle: pchip, 7 evenly spaced values [" in text for n in range(1, 25))
-    assert "the first to reach: gear " in text
+    assert "new changes: gear " in text
 
 
 def test_what_does_not_fit_is_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,15 +129,18 @@ def test_in_a_narrow_range_it_is_told_from_where_on_a_value_is_new() -> None:
     assert reached.news(SampleProgress(ranges={"x": (1e6, 1e6 + 0.006)})) == ("x above 1000000.004",)
 
 
-def test_on_a_plateau_samples_rank_by_what_their_signals_did() -> None:
+def test_on_a_plateau_it_is_told_what_nothing_moved_and_what_was_not_tried() -> None:
     problem = transmission("AT51")[0]
     still, brisk = [0.0] * 7 + [325.0] * 3, [100.0] * 7 + [0.0] * 3
     _, changing = told(problem, "MP5", sampled(problem, still, brisk, [0.0] * 7 + [300.0] * 3))
+    assert "flat: it was +0.5 in all 3 samples" in changing and "Look at the time" not in changing
+    assert "the first to reach: gear 2, gear 3, gear 4, speed above 0" in changing
     assert (
-        "flat: it was +0.5 in all 3 samples" in changing and "these got furthest: sample 2 and " in changing
+        "Not tried so far: throttle between 0 and 100; brake between 0 and 300." in changing
+        and "The same in all" not in changing
     )
-    assert "the first to reach: gear 2, gear 3, gear 4" in changing and "Look at the time" not in changing
-    assert "got furthest" not in told(problem, "MP5", sampled(problem, still, still))[1], "both are the same"
+    _, same = told(problem, "MP5", sampled(problem, still, [0.0] * 7 + [300.0] * 3))
+    assert "The same in all samples: gear." in same
     _, other = told(PROBLEM, "MP5", sampled(PROBLEM, [0.0] * 5, [0.5] * 5))
     assert "flat" not in other and "Lowest robustness so far: sample 2." in other
 
@@ -179,9 +186,9 @@ def test_first_changes_of_discrete_signals_are_told_once_with_the_other_signals(
     still, brisk = [0.0] * 7 + [325.0] * 3, [100.0] * 7 + [0.0] * 3
     problem = transmission("AT51")[0]
     _, changing = told(problem, "MP5", sampled(problem, still, brisk, [90.0] * 7 + [0.0] * 3))
-    (line,) = re.findall("first changes: (.*)", changing)
+    (line,) = re.findall("new changes: (.*)", changing)
     first, *later = line.split("; ")
-    assert re.fullmatch(r"gear 1 -> 2 at \S+ s \(speed \S+, rpm \S+\)", first)
+    assert re.fullmatch(r"gear 1 -> 2 at \S+ s \(speed \S+, rpm \S+, throttle 100, brake 0\)", first)
     assert [change.partition(" at ")[0] for change in later] == ["gear 2 -> 3", "gear 3 -> 4"]
 
 
@@ -203,3 +210,40 @@ def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> Non
     assert "- x, 0 = Idle, 1 = Run; at t = 0: 0 (Idle)" in standing
     assert "x: 0 (Idle), then 1 (Run) from 5 s, 0 (Idle) from 8 s" in changing
     assert "x stays: 0 (Idle): entered at 8 s and still held at 10 s; 1 (Run): entered once, " in changing
+
+
+def test_of_a_counter_that_rises_far_its_first_values_and_the_last_are_told() -> None:
+    view = View.of(lag_problem("G[0,10] (x <= 0.9)"))
+    view = replace(view, info=ModelInfo("m", variables=(Variable("x", kind="integer"),)))
+    times = np.linspace(0.0, 10.0, 101)
+    reached = Reached(view)
+    for top, values, changes in (
+        (0, (), ""),
+        (6, ("x 1", "x 2", "x 6"), "x 0 -> 1 at 1 s; x 1 -> 2 at 2 s; x 5 -> 6 at 6 s"),
+        (6, (), ""),
+    ):
+        trajectory = Trajectory(times, {"x": np.minimum(times // 1, top), "u": 0 * times})
+        progress = SampleProgress.of(view, trajectory)
+        told = reached.switches(progress, trajectory, 0)
+        assert re.sub(r" \(.*?\)", "", told) == changes
+        assert reached.news(progress) == values
+
+
+def test_values_that_were_not_tried_are_told_of_each_kind() -> None:
+    space = SearchSpace(
+        (
+            InputRange("u", -1.0, 1.0, control_points=2, interpolation="linear", hold=None, free=None),
+            InputRange(
+                "n", 0, 9, control_points=2, interpolation="constant", hold=None, free=None, kind="integer"
+            ),
+        ),
+        (ParameterRange("R", 1e-6, 1e-2, scale="log"),),
+        10.0,
+    )
+    tried = Tried(replace(View.of(PROBLEM), space=space))
+    tried.add(space.decode([-1.0, -0.5, 0, 9, 1e-6]))
+    assert tried.text == (
+        "Not tried so far: u between -0.5 and 1; n = 1, 2, 3, 4, 5, 6, ...; R between 1e-06 and 0.01."
+    )
+    tried.add(space.decode([-1.0, 1.0, 1, 2, 1e-5]))
+    assert tried.text == "Not tried so far: n = 3, 4, 5, 6, 7, 8; R between 1e-05 and 0.01."

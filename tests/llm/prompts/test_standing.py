@@ -14,7 +14,6 @@ from falsifier.core.model import Variable
 from falsifier.core.ranges import ParameterRange
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import with_unit
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.llm import DEFAULT_VARIANT
@@ -246,7 +245,7 @@ def test_inputs_that_are_chosen_alike_share_what_is_said_of_that() -> None:
     text = standing(replace(view, space=replace(view.space, inputs=(u, *others))))
     shared, first, second, other = text.partition("You choose the following.")[2].splitlines()[1:5]
     assert shared.startswith("- 2 input signals, each from -1 to 1; 4 control points at t")
-    assert (first, second) == (f"  - {with_unit(u.name, u.unit)}", "  - v [bar]: Pressure")
+    assert (first, second) == ("  - u [V]: drive", "  - v [bar]: Pressure")
     assert other.startswith("- input signal w") and "from -1 to 7; 4 control points" in other
 
 

@@ -1,0 +1,56 @@
+"""Which values of what is chosen the samples have tried; told where the robustness gives no direction."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import InputRange, ParameterRange
+from falsifier.llm.prompts.numbers import chosen
+from falsifier.llm.prompts.view import View
+
+# Share of a range that is told if no sample had a value in it.
+_WIDE = 0.3
+# Times at which interpolated inputs are looked at, values that are listed, digits of the others.
+_TIMES, _MOST_LISTED, _DIGITS = 100, 6, 2
+
+
+@dataclass(slots=True)
+class Tried:
+    """The values that samples had so far, by the name of the input or parameter."""
+
+    view: View
+    _values: dict[str, set[float]] = field(default_factory=dict)
+
+    def add(self, candidate: Candidate) -> None:
+        """Add a sample."""
+        times = np.linspace(0.0, self.view.space.stop_time, _TIMES)
+        for name, signal in candidate.signals.items():
+            values = signal.values if signal.interpolation == "constant" else signal.sample(times).tolist()
+            self._values.setdefault(name, set()).update(values)
+        for name, value in candidate.parameters.items():
+            self._values.setdefault(name, set()).add(value)
+
+    @property
+    def text(self) -> str:
+        """What no sample tried; empty if they tried about all."""
+        gaps = [gap for r in self.view.space.ranges if (gap := self._gap(r))]
+        return f"Not tried so far: {'; '.join(gaps)}." if gaps else ""
+
+    def _gap(self, r: InputRange | ParameterRange) -> str:
+        tried = sorted(self._values.get(r.name, ()))
+        if r.kind != "real" and r.high - r.low < _TIMES:
+            left = [str(n) for n in self._possible(r) if n not in tried]
+            listed = ", ".join((*left[:_MOST_LISTED], *(["..."] if len(left) > _MOST_LISTED else [])))
+            return f"{r.name} = {listed}" if left else ""
+        shares = np.array([0.0, *r.share_of(np.array(tried)).tolist(), 1.0])
+        widest = int(np.diff(shares).argmax())
+        if shares[widest + 1] - shares[widest] <= _WIDE:
+            return ""
+        low, high = (chosen(r, r.at(float(share)), _DIGITS) for share in shares[widest : widest + 2])
+        return f"{r.name} between {low} and {high}"
+
+    def _possible(self, r: InputRange | ParameterRange) -> Iterator[int]:
+        named = [n for _, n in r.items]
+        yield from (n for n in named or range(round(r.low), round(r.high) + 1) if r.low <= n <= r.high)

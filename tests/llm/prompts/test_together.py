@@ -1,0 +1,37 @@
+"""What must fail together, or for long, and how close a trajectory came to that."""
+
+import numpy as np
+import pytest
+
+from falsifier.core.trajectory import Trajectory
+from falsifier.evaluation.evaluate import compiled
+from falsifier.llm.prompts.together import longest_failure, near_misses, recurring
+from falsifier.stl import parse
+
+TIMES = np.linspace(0.0, 10.0, 11)
+TRAJECTORY = Trajectory(TIMES, {"x": TIMES.copy(), "y": np.where(TIMES < 4, 5.0, 0.0)})
+
+
+@pytest.mark.parametrize(
+    ("formula", "told"),
+    [
+        ("G (x <= 6 or y <= 2)", [("x <= 6 fails", 7, ["y <= 2"]), ("y <= 2 fails", 3, ["x <= 6"])]),
+        ("G (x >= 7 -> y >= 2)", [("x >= 7 holds", 7, ["y >= 2"]), ("y >= 2 fails", 10, ["x >= 7"])]),
+        ("G (x >= 0 or y <= 2)", [("y <= 2 fails", 0, ["x >= 0"])]),
+        ("G (x >= 20 or y <= 9)", []),
+        ("G (x <= 6 and y <= 2)", []),
+    ],
+)
+def test_how_close_others_came_while_one_failed(formula: str, told: list[tuple[str, int, list[str]]]) -> None:
+    parsed = parse(formula)
+    over_time = compiled(parsed, 1.0, len(TIMES)).courses(TRAJECTORY)
+    found = [(m.while_so, m.sample, [str(o) for o in m.others]) for m in near_misses(parsed, over_time)]
+    assert found == told
+
+
+def test_the_longest_failure_of_what_must_recur() -> None:
+    parsed = parse("G[0,5] F[0,4] (y >= 2)")
+    over_time = compiled(parsed, 1.0, len(TIMES)).courses(TRAJECTORY)
+    assert recurring(parsed) == (parse("y >= 2"), 4.0)
+    assert longest_failure(parsed, TIMES, over_time) == (4.0, 9.0)
+    assert longest_failure(parse("G (y >= 2)"), TIMES, over_time) is None
