@@ -43,7 +43,10 @@ def _bind(library: Any, name: str, arguments: list[Any], result: Any = ctypes.c_
 
 def make_loop(library: Any) -> Any:
     """Return a compiled communication loop over the functions of one FMU."""
-    from numba import njit
+    try:
+        from numba import njit
+    except ImportError as error:
+        raise SystemExit("numba is missing: pip install numba") from error
 
     array = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
     set_real = _bind(library, "fmi2SetReal", array)
