@@ -19,6 +19,7 @@ The columns:
     python -m bench.assurance > bench/assurance.md
 """
 
+import argparse
 import sys
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
@@ -125,6 +126,7 @@ def row(pool: ProcessPoolExecutor, name: str, probability: float) -> str:
 
 def main() -> None:
     """Print the table."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter).parse_args()
     print("# Coverage of bounds and intervals of 95 %\n")
     print("\n\n".join((__doc__ or "").split("\n\n")[1:-1]))
     print("\nCommand: `python -m bench.assurance > bench/assurance.md`\n")

@@ -3,6 +3,7 @@
 Usage: python bench/campaign.py; prints the table. Committed result: bench/campaign.md.
 """
 
+import argparse
 import platform
 import shutil
 import tempfile
@@ -47,6 +48,7 @@ BUDGET = 1500
 
 def main() -> None:
     """Measure, and print the table."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter).parse_args()
     print(f"Python {platform.python_version()}, {platform.machine()}; {SIMULATIONS} simulations each.\n")
     print("| requirement | simulation ms | engine ms | monitor ms | record and loop ms | share of the last |")
     print("|---|---|---|---|---|---|")
@@ -126,13 +128,15 @@ def suite_of(target: str) -> list[ProblemSource]:
 
 
 def long_journal(run: Path, place: Path) -> tuple[float, int]:
-    """Return the time in s to load a journal that repeats a run's lines, and its number of simulations."""
+    """Return the time in s to load a journal that repeats a run's simulations, and how many it has."""
     place.mkdir()
     shutil.copy(run / "manifest.json", place)
     pairs = [record for record in read_journal(run) if record.kind != "ended"]
     with (place / "journal.jsonl").open("wb") as file:
         for i in range(2 * LONG_JOURNAL):
-            file.write(line_of(pairs[i % len(pairs)], i + 1, pairs[0].run))
+            record = pairs[i % len(pairs)]
+            number = "first" if record.kind == "asked" else "index"
+            file.write(line_of(record.model_copy(update={number: i // 2}), i + 1, pairs[0].run))
     started = perf_counter()
     count = len(load_run(place).robustness)
     return perf_counter() - started, count

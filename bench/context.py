@@ -19,6 +19,7 @@ from time import process_time
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+from bench.search import seeds_from
 from falsifier import Result, falsify
 from falsifier.context.gather import gather
 from falsifier.engines.briefing import preview
@@ -35,14 +36,14 @@ LINES = 10_000
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seeds", default="0-9", help="first and last seed of the surrogate")
-    first, last = map(int, parser.parse_args().seeds.split("-"))
+    parser.add_argument("--seeds", type=seeds_from, default=range(10), help="for example 0-9")
+    seeds = parser.parse_args().seeds
     print("| search | context | falsified | simulations: mean | median | largest | tokens of the prompt |")
     print("|---|---|---|---|---|---|---|")
     with TemporaryDirectory() as folder:
         files = (None, *_files(Path(folder)))
         for file in files:
-            print(_surrogate(range(first, last + 1), file), flush=True)
+            print(_surrogate(seeds, file), flush=True)
         for row in map(_scripted, files):
             print(row, flush=True)
         print(f"\n{_reading(Path(folder))}")

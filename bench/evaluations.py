@@ -6,6 +6,7 @@ The FMU's own time is measured with the same candidates in the same worker, but 
 inputs, monitor and journal.
 """
 
+import argparse
 import tempfile
 from time import perf_counter
 
@@ -18,6 +19,7 @@ ROUNDS = 3
 
 def main() -> None:
     """Print both times and their ratio, the best of several rounds."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter).parse_args()
     # No input reaches this bound, so the search does not stop early.
     problem = load_problem("AT1", stl="G[0,20] (speed <= 1000)")
     candidates = make_engine("uniform", problem, seed=1).ask(COUNT)

@@ -12,7 +12,8 @@ from statistics import mean, stdev
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier import falsify
+from bench.search import seeds_from
+from falsifier import ENGINES as ALL_ENGINES, falsify
 from falsifier.core.experiment import Experiment
 from falsifier.core.function_model import FunctionModel
 from falsifier.core.model import Kind, ModelInfo, Variable
@@ -147,9 +148,10 @@ PROBLEMS: dict[str, Callable[[], Problem]] = {
 def compare(problems: Mapping[str, Callable[[], Problem]], description: str | None) -> None:
     """Read the options of the command line and print the table, row by row, with the means last."""
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--engines", nargs="+", default=list(ENGINES))
-    parser.add_argument("--requirements", nargs="+", default=list(problems))
-    parser.add_argument("--seeds", type=int, nargs=2, default=(0, 9), metavar=("FIRST", "LAST"))
+    known = sorted(set(ALL_ENGINES) - {"hybrid"})
+    parser.add_argument("--engines", nargs="+", choices=known, default=ENGINES)
+    parser.add_argument("--requirements", nargs="+", choices=problems, default=list(problems), metavar="NAME")
+    parser.add_argument("--seeds", type=seeds_from, default=range(10), help="for example 0-9")
     parser.add_argument("--budget", type=int, default=300)
     parser.add_argument("--free", type=int, metavar="PIECES", help="inputs may have so many control points")
     options = parser.parse_args()
@@ -162,12 +164,12 @@ def compare(problems: Mapping[str, Callable[[], Problem]], description: str | No
             if options.free and problem.space.inputs:
                 shortest = problem.space.stop_time / options.free
                 problem = replace(problem, space=problem.space.freed(shortest))
-            for seed in range(options.seeds[0], options.seeds[1] + 1):
+            for seed in options.seeds:
                 result = falsify(problem, engine, seed=seed, budget=options.budget)
                 counts.append(result.spent.simulations if result.falsified else options.budget)
                 found += result.falsified
-            error = stdev(counts) / len(counts) ** 0.5
-            cells.append(f"{mean(counts):.1f} ± {error:.1f} @ {found}")
+            error = f" ± {stdev(counts) / len(counts) ** 0.5:.1f}" if len(counts) > 1 else ""
+            cells.append(f"{mean(counts):.1f}{error} @ {found}")
             means[engine].append(mean(counts))
         print(f"| {' | '.join(cells)} |", flush=True)
     print(f"| {' | '.join(['mean', *(f'{mean(row):.1f}' for row in means.values())])} |")

@@ -9,6 +9,7 @@ its table with the trajectory found here.
 
 import argparse
 import csv
+import re
 import subprocess
 import sys
 import tempfile
@@ -94,7 +95,13 @@ def main() -> None:
         shown = (*(cells.get(name, "") for name in COLUMNS),)
         lines.append(f"| {habit.fmu} | {habit.exporter} | {habit.habit} | {' | '.join(shown)} |")
         print(lines[-1], flush=True)
-    arguments.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    lines += [
+        "",
+        "Plain fmpy loads only libraries with the name of the model identifier, which is why OtherLibrary_2 "
+        "cannot be replayed with it.",
+        "",
+    ]
+    arguments.out.write_text("\n".join(lines), encoding="utf-8")
 
 
 def _walk(habit: Habit, folder: Path) -> dict[str, str]:
@@ -136,6 +143,7 @@ def _looked(name: str, habit: Habit, folder: Path) -> tuple[str, None]:
     if name == "init":
         spec.write_text(starter_spec(fmu, info), encoding="utf-8")
     else:
+        spec.write_text(spec.read_text(encoding="utf-8").replace("LIMIT", "5"), encoding="utf-8")
         load_problem(str(spec))
     return "ok", None
 
@@ -159,7 +167,7 @@ def _replayed(problem: Problem, trajectory: Any, folder: Path) -> str:
     script = [sys.executable, str(folder / "replay.py")]
     done = subprocess.run(script, capture_output=True, text=True, check=False)
     if done.returncode:
-        return f"failed: {done.stderr.strip().splitlines()[-1]}"
+        return f"failed: {re.sub(r'/[^ ]*/(?=binaries/)', '', done.stderr.strip().splitlines()[-1])}"
     with (folder / "outputs.csv").open(encoding="utf-8", newline="") as file:
         header, *rows = csv.reader(file)
     table = np.array(rows, dtype=np.float64)

@@ -228,7 +228,7 @@ def report(rounds: int) -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--rounds", type=int, default=200)
     parser.add_argument("--out", type=Path, default=HERE / "fmu_overhead.md")
     options = parser.parse_args()

@@ -30,6 +30,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+from bench.search import seeds_from
 from falsifier import Candidate, Problem, Signal, falsify, load_problem
 from falsifier.core.ranges import InputRange
 from falsifier.engines.hybrid import Hybrid
@@ -165,15 +166,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--requirements", nargs="+", default=REQUIREMENTS)
     parser.add_argument("--kinds", nargs="+", default=KINDS, choices=KINDS)
-    parser.add_argument("--seeds", default="500-559")
+    parser.add_argument("--seeds", type=seeds_from, default=range(500, 560), help="for example 500-559")
     parser.add_argument("--budget", type=int, default=60)
     arguments = parser.parse_args()
-    first, _, last = arguments.seeds.partition("-")
-    seeds = range(int(first), int(last or first) + 1)
     print("| requirement | LLM | surrogate alone | hybrid | more than the better half |")
     print("|---|---|---|---|---|")
     for name in arguments.requirements:
-        rows(name, seeds, arguments.budget, arguments.kinds)
+        rows(name, arguments.seeds, arguments.budget, arguments.kinds)
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ that are not installed are omitted, and so are evaluations that would take minut
     python bench/monitor_speed.py > bench/monitor_speed.md
 """
 
+import argparse
 import contextlib
 import gc
 import platform
@@ -199,6 +200,7 @@ def batch() -> str:
 
 def main() -> None:
     """Print the tables."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter).parse_args()
     warnings.simplefilter("ignore")
     print("# Time of one robustness value\n")
     print("Processor time in microseconds; `x` is the multiple of the time here. Method: see")

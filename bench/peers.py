@@ -132,10 +132,18 @@ def row(requirement: str, method: str, searches: Sequence[Search]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+def interpreter(text: str) -> Path:
+    """Return the interpreter that a command line names; it must have psy-taliro."""
+    command = ["sh", "-c", 'exec "$0" -c "import staliro"', text]
+    if subprocess.run(command, capture_output=True, check=False).returncode:
+        raise argparse.ArgumentTypeError(f"{text} cannot import staliro; see bench/peers.py")
+    return Path(text)
+
+
 def main() -> None:
     """Print the table, row by row."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--peer", type=Path, required=True, help="interpreter that can import staliro")
+    parser.add_argument("--peer", type=interpreter, required=True, help="interpreter that can import staliro")
     parser.add_argument("--requirements", nargs="+", default=REQUIREMENTS + FAULTS, metavar="NAME")
     parser.add_argument("--seeds", type=int, default=10, help="number of seeds, from 100 on")
     parser.add_argument("--budget", type=int, default=300)

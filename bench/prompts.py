@@ -8,6 +8,7 @@ envelope as it is told, digits and all, must not be further from the signal than
 are rounded as the prompt says. Values at the critical time and lists of changes are compared, too.
 """
 
+import argparse
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -141,6 +142,7 @@ def _points(text: str) -> tuple[Array, Array]:
 
 def main() -> None:
     """Print the tables."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter).parse_args()
     print("# Prompts\n\nMade by `python -m bench.prompts`; how, is said there.\n")
     print("## Tokens by number of samples\n")
     print("Kept: share of the question after 20 samples that is the same as in the question before.\n")

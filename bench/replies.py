@@ -5,6 +5,7 @@
 Each is the same good reply (two inputs of three and two control points, one parameter) with one mistake.
 """
 
+import argparse
 import json
 from collections.abc import Iterator
 
@@ -97,6 +98,7 @@ def outcome(reply: ChatReply) -> str:
 
 def main() -> None:
     """Print the table."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter).parse_args()
     print("# Odd replies\n\nMade by `python -m bench.replies`; how, is said there.\n")
     print("| the reply has | it is |\n|---|---|")
     found = [(name, outcome(reply)) for name, reply in odd_replies()]

@@ -9,6 +9,7 @@ simulations, and the rows take turns, because a busy machine only ever adds time
 
 from __future__ import annotations
 
+import argparse
 import platform
 import tempfile
 import time
@@ -62,6 +63,7 @@ def fastest(runs: dict[str, Callable[[], float]], rounds: int) -> dict[str, floa
 
 def main() -> None:
     """Measure and print."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter).parse_args()
     lag, chained = FOLDER / "CheapLag_2.fmu", {"b.u": "a.y"}
     third = FOLDER / "CheapLag_3.fmu"
     chain = System({"a": lag, "b": lag}, chained)

@@ -6,6 +6,8 @@ in random states of the crane. It learns it only roughly: its errors are part of
     python -m bench.train_crane
 """
 
+import argparse
+
 import numpy as np
 from scipy.linalg import solve_continuous_are
 
@@ -46,6 +48,7 @@ def train(steps: int = 20_000, seed: int = 7) -> list[np.ndarray]:
 
 def main() -> None:
     """Print the weights as Modelica."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter).parse_args()
     for name, values in zip(("states", "offset", "units"), train(), strict=True):
         rows = [", ".join(f"{value:.6g}" for value in row) for row in np.atleast_2d(values)]
         print(name, "= {" + ("{" + "},\n  {".join(rows) + "}" if values.ndim == 2 else rows[0]) + "};")

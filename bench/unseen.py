@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean, stdev
 
-from bench.peers import PEERS, peer_search
+from bench.peers import PEERS, interpreter, peer_search
 from bench.search import seeds_from
 from falsifier import ENGINES, Problem, evaluate, falsify, load_problem, make_engine
 from falsifier.evaluation.evaluate import judge
@@ -134,7 +134,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=seeds_from, default=range(10), help="for example 0-9")
     parser.add_argument("--budget", type=int, default=300)
     parser.add_argument("--free", action="store_true", help="engines may choose control points")
-    parser.add_argument("--peer", type=Path, help="interpreter that can import staliro")
+    parser.add_argument("--peer", type=interpreter, help="interpreter that can import staliro")
     parser.add_argument("--rates", type=int, metavar="N", help="instead: judge N uniform samples")
     options = parser.parse_args()
     if options.rates:

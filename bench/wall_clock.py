@@ -26,7 +26,7 @@ from statistics import mean, stdev
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from bench.peers import PEERS, peer_search
+from bench.peers import PEERS, interpreter, peer_search
 from falsifier import Budget, Problem, falsify, load_problem
 from falsifier.core.experiment import Experiment
 from falsifier.core.model import Model, ModelInfo
@@ -108,12 +108,12 @@ def main() -> None:
     """Print one line per requirement and method."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--requirements", nargs="+", default=REQUIREMENTS, metavar="NAME")
-    parser.add_argument("--methods", nargs="+", default=METHODS, metavar="ENGINE[:time]")
+    parser.add_argument("--methods", nargs="+", default=METHODS, metavar="ENGINE")
     parser.add_argument("--jobs", nargs="+", type=int, default=[1])
     parser.add_argument("--slower", type=float, default=0.0, metavar="SECONDS")
     parser.add_argument("--seconds", type=float, default=60.0, help="limit of each run")
     parser.add_argument("--seeds", type=int, nargs=2, default=(100, 104), metavar=("FIRST", "LAST"))
-    parser.add_argument("--peer", type=Path, help="interpreter that can import staliro")
+    parser.add_argument("--peer", type=interpreter, help="interpreter that can import staliro")
     options = parser.parse_args()
     print("| requirement | method | jobs | FR | simulations | seconds |\n|---|---|---|---|---|---|")
     for name in options.requirements:

@@ -4,13 +4,15 @@
 
 Simulates each bundled FMU by turns with its library for Linux and, through Wine, with the one for Windows:
 each interface up to the stop time of its default experiment, at its step, with inputs that are new in each
-round. Then the start of a process, up to the end of its first simulation. Needs Wine.
+round; FMUs that fail with such inputs are left out. Then the start of a process, up to the end of its first
+simulation. Needs Wine.
 """
 
 import argparse
 import os
 import platform
 import subprocess
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +24,7 @@ from falsifier.core.experiment import Experiment
 from falsifier.core.model import Interface
 from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.trajectory import Trajectory
+from falsifier.errors import SimulationError
 from falsifier.fmu import FmuModel, read_info
 from falsifier.fmu.description import libraries
 
@@ -119,7 +122,11 @@ def report(rounds: int) -> str:
     ]
     for path in sorted(FMUS.glob("*.fmu")):
         for interface in read_info(path).interfaces:
-            times, between, within = measure(path, interface, rounds)
+            try:
+                times, between, within = measure(path, interface, rounds)
+            except SimulationError as error:
+                print(f"{path.stem}, {interface}: left out: {error}", file=sys.stderr)
+                continue
             low, middle = times.min(axis=0), np.median(times, axis=0)
             ratio = float(np.median(times[:, 1] / times[:, 0]))
             cells = [f"{low[k]:.2f} ({middle[k]:.2f})" for k in (0, 1)]
@@ -138,7 +145,7 @@ def report(rounds: int) -> str:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--rounds", type=int, default=30)
     parser.add_argument("--out", type=Path, default=HERE / "wine.md")
     options = parser.parse_args()

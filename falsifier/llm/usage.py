@@ -21,8 +21,8 @@ from falsifier.llm.messages import ChatRequest, Usage
 _MOST_TOKENS = 10**9
 # The file of the vocabulary cl100k_base, as tiktoken names it in its cache.
 _VOCABULARY = "9b5ad71b2ce5302211f9c61530b329a4922fc6a4"
-# Characters per token of prompts for the bundled systems (bench/prompts.md), rounded down; used if there is
-# no vocabulary. English text alone has about four.
+# Characters per token, used if there is no vocabulary: fewer than most prompts for the bundled systems have,
+# which are full of numbers. English text alone has about four.
 _CHARACTERS_PER_TOKEN = 2.0
 _DIGITS = re.compile(r"\d+", re.ASCII)
 # Parts of the names of LLMs whose tokenizers group up to three digits.

@@ -24,6 +24,9 @@ from falsifier.stl.monitor import Verdict
 from falsifier.views.plotting.panels import Panel, panels
 from falsifier.views.text import Labels
 
+# Maximum number of counterexamples of a requirement that are shown.
+MOST_SHOWN = 3
+
 Status = Literal["violated", "no violation found", "no violation confirmed", "not finished", "failed"]
 
 
@@ -77,6 +80,7 @@ class Section:
     by_method: dict[str, list[Run]]  # its runs by method
     # Counterexamples, the shrunk and quickest ones first; if there are none, the best simulation of all runs.
     shown: list[Shown]
+    found: list[Run]  # the runs that found what is shown, or would be if it were not too much
 
     @property
     def runs(self) -> list[Run]:
@@ -148,10 +152,12 @@ def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
     if not found:
         judged = {run.verdict.robustness: run for run in reversed(runs) if run.verdict is not None}
         found = [judged[min(judged)]] if judged else []
-    return section_of(name, by_method, [_shrunk(run) or shown_of(run, _recorded(run)) for run in found])
+    both = sorted(((run, _shrunk(run)) for run in found), key=lambda b: (b[1] is None, b[0].simulations))
+    shown = [shrunk or shown_of(run, _recorded(run)) for run, shrunk in both[:MOST_SHOWN]]
+    return section_of(name, by_method, shown, [run for run, _ in both])
 
 
-def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -> Section:
+def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown], found: list[Run]) -> Section:
     """Return what is said of a requirement; shown: counterexamples or, without any, the best simulation."""
     runs = [run for members in by_method.values() for run in members]
     requirement = runs[0].manifest.requirement
@@ -164,7 +170,8 @@ def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown]) -
         requirement.formula,
         requirement.description or in_words(parse(requirement.formula)),
         by_method,
-        sorted(shown, key=lambda one: (not one.is_shrunk, one.run.simulations)),
+        shown,
+        found,
     )
 
 

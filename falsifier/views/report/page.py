@@ -23,9 +23,9 @@ from falsifier.views.text import Fact, llm_use
 if TYPE_CHECKING:
     from falsifier.views.plotting import Figure
 
-# Maximum number of counterexamples of a requirement that are drawn, of runs whose questions are shown, and of
-# questions on the whole page: a page that is sent around should stay below a few MB.
-_MOST_DRAWN, _MOST_TALKS, _MOST_QUESTIONS = 3, 3, 30
+# Maximum number of runs of a requirement whose questions are shown, and of questions on the whole page, which
+# should stay below a few MB, to be sent around.
+_MOST_TALKS, _MOST_QUESTIONS = 3, 30
 # Longer tables of inputs are folded.
 _MOST_ROWS = 12
 # Columns of the table of statistics that name a row, and those folded away so that the others fit on paper.
@@ -38,7 +38,7 @@ def html_report(*directories: Path) -> str:
     sides = gather(*directories)
     title = " and ".join(side.title for side in sides)
     requirements = by_requirement(sides)
-    asking = [sum(s.run.spent.questions > 0 for s in c.shown) for side in sides for c in side.sections]
+    asking = [sum(run.spent.questions > 0 for run in c.found) for side in sides for c in side.sections]
     most = max(1, _MOST_QUESTIONS // max(1, sum(min(_MOST_TALKS, count) for count in asking)))
     links = [el("li", el("a", name, href=f"#{_anchor(name)}")) for name in requirements]
     found = wording.differences(sides)
@@ -190,7 +190,7 @@ def _details(section: Section, most: int) -> Html:
     if len(runs) > 1:
         histories.append(drawn(lambda: plot_rates(runs), "Share of falsified runs over simulations"))
     others = []
-    for other in section.shown[1:_MOST_DRAWN]:
+    for other in section.shown[1:]:
         heading = f"{run_name(other.run)}: after {other.run.spent.simulations_text}"
         others.append(el("details", el("summary", heading), *_found(other), _shown_details(other)))
     return el(
@@ -231,7 +231,7 @@ def _shown_details(shown: Shown) -> Html:
 
 def _questions(section: Section, most: int) -> str:
     """What the runs of a requirement asked a language model."""
-    asked = [shown.run for shown in section.shown if shown.run.spent.questions]
+    asked = [run for run in section.found if run.spent.questions]
     if not asked:
         return ""
     parts = [
