@@ -90,7 +90,7 @@ def told_courses(view: View, evaluation: Evaluation) -> Iterator[Told]:
                 clock = coarse_clock(view.space.stop_time)
                 stated = told_accuracy(view, name, column)
                 yield _compared(name, line[len(name) + 2 :], inside.times, column, stated, clock)
-            if line.startswith(f"{name} around t = "):
+            if line.startswith(f"{name} around t = ") and ": least " not in line:
                 part = close_up_times(view, inside.times, column, evaluation)
                 times, column = inside.times[part], column[part]
                 stated = CLOSE_TOLERANCE * float(np.ptp(column))

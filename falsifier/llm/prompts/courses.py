@@ -32,6 +32,8 @@ _MOST_SWINGS = 3
 _RIPPLE_SHARE = 0.02
 # or than these multiples of what is allowed, where that is less.
 _OF_RIPPLE = 1.5
+# Share of its span within which a course must be told to be told at all.
+_TOO_COARSE = 0.3
 # Fewer turning points are a transient, not an oscillation.
 _MIN_TURNS = 6
 # Above every distance in multiples of what is allowed, which is no less than a thousandth of a span.
@@ -195,6 +197,8 @@ def course(
     within = f"each value within {plain(off + 0.5 * 10.0**-decimals, decimals)}"
     ends = ((word, int(find(column))) for word, find in (("least", np.argmin), ("greatest", np.argmax)))
     extremes = ", ".join(f"{word} {column[k]:.5g} at {plain(times[k], clock)} s" for word, k in ends)
+    if off > _TOO_COARSE * float(np.ptp(column)):
+        return f"{extremes}, and too irregular in between to be told"
     return f"{text} ({within}; {extremes})"
 
 

@@ -237,7 +237,7 @@ def _predicates(
         else:
             begin, stop = (plain(time, clock) for time in stretch)
             total = number(float(wrong.sum()) * step)
-            found = f"false for {total} s in total, longest from {begin} to {stop} s"
+            found = f"false for about {total} s in total, longest from {begin} to {stop} s"
         yield f"{predicate}, from {plain(start, clock)} to {plain(end, clock)} s: {found}"
 
 

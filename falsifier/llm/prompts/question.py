@@ -21,7 +21,8 @@ from falsifier.llm.prompts import published
 from falsifier.llm.prompts.numbers import as_signals, number
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, fine_clock, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
-from falsifier.llm.prompts.standing import standing
+from falsifier.llm.prompts.standing import formula_text, standing
+from falsifier.llm.prompts.together import recurring
 from falsifier.llm.prompts.tried import Tried
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.llm.usage import count_tokens
@@ -64,6 +65,10 @@ _ON_STRATEGY = (
 _SUCH = (
     ", such as a single short pulse, a small amplitude, a slow change or a faster repetition; the limits of "
     "the ranges are not always the worst, as values just short of what the system reacts to may be"
+)
+_LONGEST = (
+    "{condition} was false longest in one piece for {longest}; {limit} s violate the requirement. That tells "
+    "more than the robustness: look at how that piece began and ended."
 )
 _FLAT = "The robustness is flat: it was {lowest} in all {count} samples, so its value gives no direction."
 
@@ -113,6 +118,7 @@ class Questions:
         self._inputs: dict[str, int] = {}
         self._reached = Reached(view)
         self._tried = Tried(view)
+        self._recurring = recurring(view.requirement.formula)
         self._only_jumps = all(r.kind != "real" for r in view.space.inputs)
         self._climb = Climb(_counting(view), "sample")
 
@@ -223,7 +229,7 @@ class Questions:
             yield "\n".join((_PENDING, *waiting))
         if is_own and self._judged:
             what = self._view.chosen
-            is_timed = not self._is_flat() and any(s.is_timed for s in self._judged)
+            is_timed = not (self._is_flat() or self._recurring) and any(s.is_timed for s in self._judged)
             on_time = [_ON_TIME.format(what=what)] if is_timed else []
             on_strategy = _ON_STRATEGY.format(such="" if self._only_jumps else _SUCH)
             yield "\n".join((_ON_OUTPUTS.format(one=what[:-1]), *on_time, on_strategy))
@@ -238,12 +244,15 @@ class Questions:
             return
         if self._is_flat():
             yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations)
+        elif self._recurring and ranked[0].failure:
+            condition, limit = self._recurring
+            longest = [f"{number(s.failure)} s in sample {s.number}" for s in ranked[:_NAMED] if s.failure]
+            yield _LONGEST.format(
+                condition=formula_text(condition), longest=", ".join(longest), limit=number(limit)
+            )
         else:
             better = [f"sample {s.number}" for s in ranked[:_NAMED] if s.robustness != ranked[-1].robustness]
             yield f"Lowest robustness so far: {listed(better)}."
-        if any(s.failure for s in self._judged):
-            longest = max(self._judged, key=lambda s: s.failure)
-            yield f"Longest in one piece so far: {number(longest.failure)} s, in sample {longest.number}."
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
             yield "\n".join((*few, *self._climb.lines))
@@ -256,10 +265,13 @@ class Questions:
         return levels.simulations > 1 and len(levels.found) == 1
 
     def _best_first(self) -> list[_Sample]:
-        """Samples with a verdict by their robustness; where it is flat, by how far their signals got."""
+        """Samples with a verdict by how long what must recur failed, if something must, and their robustness.
+
+        Where the robustness is flat, by how far their signals got.
+        """
         if self._is_flat():
             return sorted(self._judged, key=lambda s: self._reached.rank(s.progress), reverse=True)
-        return sorted(self._judged, key=lambda s: (s.robustness or 0.0, s.number))
+        return sorted(self._judged, key=lambda s: (-s.failure, s.robustness or 0.0, s.number))
 
     def _left(self, budget: int | None) -> str:
         if budget is None:
@@ -293,12 +305,13 @@ class Questions:
         robustness = f"robustness {signed(verdict.robustness, ROBUSTNESS_DIGITS)}"
         if is_on_limit(verdict.robustness):
             robustness += f" ({margin_words(verdict.robustness, verdict.predicate)})"
-        reached = f"the first to reach: {', '.join(news)}" if news else ""
-        head = (robustness, doubt, *notes, reached, f"new changes: {switches}" if switches else "")
+        reached = f"the first to reach: {'; '.join(news)}" if news else ""
+        head = (robustness, doubt, *notes, reached)
+        changes = f"new changes: {switches}" if switches else ""
         brief = inputs if why else as_signals(self._view, candidate, in_brief=True)
         texts = (
-            _text(inputs, *head, *found.full),
-            _text(inputs, *head, *found.short),
+            _text(inputs, *head, changes, *found.full),
+            _text(inputs, *head, changes, *found.short),
             _text(brief, *head, found.line),
         )
         best = min((s.robustness for s in self._judged if s.robustness is not None), default=None)

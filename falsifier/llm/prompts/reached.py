@@ -78,25 +78,32 @@ class Reached:
         return (*found[:_MOST_NEW], *(["..."] if len(found) > _MOST_NEW else []))
 
     def switches(self, progress: SampleProgress, trajectory: Trajectory, clock: int) -> str:
-        """When discrete signals made changes that no earlier sample made, and the other signals at that time.
+        """When discrete signals made changes that no earlier sample made, and all else of that time.
 
         It is to be called before the sample is added; ``clock`` is the number of decimals of times.
         """
         new = {k: [c for c in changes if c not in self._stages] for k, changes in progress.changes.items()}
         few = self._few([change for changes in new.values() for change in changes])
+        discrete = {name for name, _, _ in progress.stages}
         inputs = [r.name for r in self._view.space.inputs if r.name in trajectory.columns]
         names = [*list(progress.ranges)[:_MOST_BESIDE], *(inputs if len(inputs) <= _MOST_BESIDE else ())]
         columns = {name: trajectory[name] for name in names}
         told = []
         for k, changes in new.items():
-            if kept := [self._stage(change) for change in changes if change in few]:
+            if any(change in few for change in changes):
                 beside = (
                     f"{n} {self._view.labelled(n, float(c[k]), plain(float(c[k]), column_decimals(c)))}"
                     for n, c in columns.items()
                 )
                 time = f"at {plain(trajectory.times[k], clock)} s"
-                told.append(f"{', '.join(kept)} {time}" + (f" ({', '.join(beside)})" if columns else ""))
-        return "; ".join((*told[:_MOST_SWITCHES], *(["..."] if len(told) > _MOST_SWITCHES else [])))
+                together = (
+                    self._stage((name, float(trajectory[name][k - 1]), float(trajectory[name][k])))
+                    for name in self._view.recorded
+                    if name in discrete and trajectory[name][k - 1] != trajectory[name][k]
+                )
+                told.append(f"{', '.join(together)} {time}" + (f" ({', '.join(beside)})" if columns else ""))
+        is_all = len(told) == sum(map(bool, new.values())) <= _MOST_SWITCHES
+        return "; ".join((*told[:_MOST_SWITCHES], *([] if is_all else ["..."])))
 
     @property
     def unmoved(self) -> str:
@@ -141,6 +148,8 @@ class Reached:
             least, most = self._ranges.get(name, (low, high))
             least_new = _FURTHER * (most - least)
             if high > most + least_new:
-                yield f"{name} above {number(most, resolving(most, high - most, 3))}"
+                digits = resolving(most, high - most, 3)
+                yield f"{name} up to {number(high, digits)}, before {number(most, digits)}"
             if low < least - least_new:
-                yield f"{name} below {number(least, resolving(least, least - low, 3))}"
+                digits = resolving(least, least - low, 3)
+                yield f"{name} down to {number(low, digits)}, before {number(least, digits)}"

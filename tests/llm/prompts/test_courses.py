@@ -79,6 +79,13 @@ def test_a_course_that_needs_more_points_says_how_exact_it_is() -> None:
     assert claimed < error <= float(within) <= 2 * error
 
 
+def test_of_what_is_too_irregular_only_the_extremes_are_told() -> None:
+    wild = np.random.default_rng(0).uniform(-1, 1, len(TIMES))
+    wild[[300, 700]] = -2.0, 3.0
+    told = course(TIMES, wild, clock=2, tolerance=0.1, slower_than=0.0, most=6)
+    assert told == "least -2 at 3 s, greatest 3 at 7 s, and too irregular in between to be told"
+
+
 def test_near_a_threshold_points_are_finer_once_the_rest_is_exact_enough() -> None:
     wave = np.sin(TIMES)
     told = course(TIMES, wave, clock=2, tolerance=np.where(TIMES > 6, 0.012, 0.1), slower_than=0.5)

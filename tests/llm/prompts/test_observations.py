@@ -68,7 +68,7 @@ def test_times_of_microseconds_are_told_apart() -> None:
     lines = facts(view, Evaluation(candidate, "ok", verdict, "", trajectory))
     assert line(lines, "all signals at t = 8e-06 s: ")
     assert line(lines, "x <= 0.755, ").endswith(
-        "false for 2.5e-06 s in total, longest from 7.6e-06 to 1e-05 s"
+        "false for about 2.5e-06 s in total, longest from 7.6e-06 to 1e-05 s"
     )
     around = line(lines, "x around t = ").partition(" s: ")[2].split()
     assert len({point.partition(":")[0] for point in around}) == len(around) > 2
@@ -86,7 +86,7 @@ def test_what_broke_is_told_before_the_condition_that_decided() -> None:
     [
         ("x >= -1", "always true, smallest margin 1 at 0 s"),
         ("x <= -2", "never true, closest at 0 s, off by 2"),
-        ("x <= 6", "false for 4 s in total, longest from 6.1 to 10 s"),
+        ("x <= 6", "false for about 4 s in total, longest from 6.1 to 10 s"),
         ("x != 4", "false only at 4 s"),
         ("x > 0", "false only at 0 s"),
         ("x < 10", "false only at 10 s"),

@@ -73,7 +73,7 @@ def test_a_long_history_is_shortened_rarely_and_keeps_what_matters() -> None:
     assert kept.count(False) <= len(kept) // 3
     text = messages[1].content
     assert all(f"Sample {n}: throttle: pchip, 7 evenly spaced values [" in text for n in range(1, 25))
-    assert "new changes: gear " in text
+    assert "the first to reach: speed " in text
 
 
 def test_what_does_not_fit_is_left_out_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,7 +126,9 @@ def test_what_few_samples_reached_counts_more_than_much_that_many_did() -> None:
 def test_in_a_narrow_range_it_is_told_from_where_on_a_value_is_new() -> None:
     reached = Reached(View.of(PROBLEM))
     reached.news(SampleProgress(ranges={"x": (1e6, 1e6 + 0.004)}))
-    assert reached.news(SampleProgress(ranges={"x": (1e6, 1e6 + 0.006)})) == ("x above 1000000.004",)
+    assert reached.news(SampleProgress(ranges={"x": (1e6, 1e6 + 0.006)})) == (
+        "x up to 1000000.006, before 1000000.004",
+    )
 
 
 def test_on_a_plateau_it_is_told_what_nothing_moved_and_what_was_not_tried() -> None:
@@ -134,7 +136,7 @@ def test_on_a_plateau_it_is_told_what_nothing_moved_and_what_was_not_tried() -> 
     still, brisk = [0.0] * 7 + [325.0] * 3, [100.0] * 7 + [0.0] * 3
     _, changing = told(problem, "MP5", sampled(problem, still, brisk, [0.0] * 7 + [300.0] * 3))
     assert "flat: it was +0.5 in all 3 samples" in changing and "Look at the time" not in changing
-    assert "the first to reach: gear 2, gear 3, gear 4, speed above 0" in changing
+    assert "the first to reach: gear 2; gear 3; gear 4; speed up to " in changing
     assert (
         "Not tried so far: throttle between 0 and 100; brake between 0 and 300." in changing
         and "The same in all" not in changing
@@ -219,7 +221,7 @@ def test_of_a_counter_that_rises_far_its_first_values_and_the_last_are_told() ->
     reached = Reached(view)
     for top, values, changes in (
         (0, (), ""),
-        (6, ("x 1", "x 2", "x 6"), "x 0 -> 1 at 1 s; x 1 -> 2 at 2 s; x 5 -> 6 at 6 s"),
+        (6, ("x 1", "x 2", "x 6"), "x 0 -> 1 at 1 s; x 1 -> 2 at 2 s; x 5 -> 6 at 6 s; ..."),
         (6, (), ""),
     ):
         trajectory = Trajectory(times, {"x": np.minimum(times // 1, top), "u": 0 * times})
@@ -247,3 +249,28 @@ def test_values_that_were_not_tried_are_told_of_each_kind() -> None:
     )
     tried.add(space.decode([-1.0, 1.0, 1, 2, 1e-5]))
     assert tried.text == "Not tried so far: n = 3, 4, 5, 6, 7, 8; R between 1e-05 and 0.01."
+
+
+def test_all_changes_of_a_moment_are_told_if_one_of_them_is_new() -> None:
+    view = View.of(lag_problem("G[0,10] (x <= 0.9)"))
+    kinds = (Variable("x", kind="boolean"), Variable("n", kind="integer"))
+    view = replace(view, info=ModelInfo("m", variables=kinds))
+    view = replace(view, experiment=replace(view.experiment, outputs=("x", "n")))
+    times = np.linspace(0.0, 10.0, 11)
+    reached, told = Reached(view), list[str]()
+    switched = np.where(times >= 4, 1.0, 0.0)
+    for n in (np.zeros_like(times), switched):
+        trajectory = Trajectory(times, {"x": switched, "n": n})
+        progress = SampleProgress.of(view, trajectory)
+        told.append(reached.switches(progress, trajectory, 0))
+        reached.news(progress)
+    assert told == ["x 0 -> 1 at 4 s", "x 0 -> 1, n 0 -> 1 at 4 s"]
+
+
+def test_samples_are_the_best_by_how_long_what_must_recur_failed() -> None:
+    problem = lag_problem("G[0,6] F[0,3] (x >= 0.2)")
+    low, high = [1.0, 1.0, -1.0, -1.0], [1.0, 1.0, 1.0, -1.0]
+    _, changing = told(problem, "MP5", sampled(problem, high, low))
+    (line,) = re.findall(r"x >= 0\.2 was false .*", changing)
+    assert re.match(r".* for \S+ s in sample 2, \S+ s in sample 1; 3 s violate the requirement\.", line)
+    assert "Lowest robustness" not in changing and "Look at the time" not in changing
