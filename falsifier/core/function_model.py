@@ -11,7 +11,7 @@ from falsifier.core.experiment import Experiment
 from falsifier.core.model import ModelInfo, check_finite
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import SimulationError, did_you_mean
+from falsifier.errors import ModelError, SimulationError, did_you_mean
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +24,9 @@ class FunctionModel:
             name; returns one array of shape (n,) per output name. It must be importable (no lambda) if it is
             to run in other processes.
         info: name, description and variables; inputs, parameters and outputs must be listed.
+
+    Raises:
+        ModelError: if an input and an output have the same name.
     """
 
     function: Callable[
@@ -35,6 +38,9 @@ class FunctionModel:
     def __post_init__(self) -> None:
         instance("function", self.function, Callable, "a function")
         instance("info", self.info, ModelInfo, "a ModelInfo")
+        inputs = {v.name for v in self.info.inputs}
+        if both := next((v.name for v in self.info.outputs if v.name in inputs), None):
+            raise ModelError(f"{self.info.name}: {both!r} is an input and an output; rename one of them")
 
     def simulate(
         self, signals: Mapping[str, Signal], parameters: Mapping[str, float], experiment: Experiment

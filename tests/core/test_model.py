@@ -14,7 +14,7 @@ from falsifier.core.function_model import FunctionModel
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory, is_discrete
-from falsifier.errors import MonitorError, SimulationError, SpecError
+from falsifier.errors import ModelError, MonitorError, SimulationError, SpecError
 
 INFO = ModelInfo(
     "tank",
@@ -52,6 +52,9 @@ def test_a_function_is_a_model() -> None:
     assert got.units == {"level": "m"}
     with pytest.raises(SpecError, match="function: expected a function, got ModelInfo"):
         FunctionModel(INFO, tank)  # type: ignore[arg-type]
+    both = replace(INFO, variables=(*INFO.variables, Variable("inflow", causality="output")))
+    with pytest.raises(ModelError, match="tank: 'inflow' is an input and an output"):
+        FunctionModel(tank, both)
 
 
 @pytest.mark.parametrize(("given", "level"), [({}, 0.0), ({"inflow": 3.0, "area": 1.0}, 3.0)])
