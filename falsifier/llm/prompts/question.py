@@ -22,6 +22,7 @@ from falsifier.llm.prompts.numbers import as_signals, number
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, fine_clock, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.standing import standing
+from falsifier.llm.prompts.together import recurring
 from falsifier.llm.prompts.tried import Tried
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.llm.usage import count_tokens
@@ -208,7 +209,8 @@ class Questions:
         waiting = ["; ".join(self._chosen(c)) for c in pending]
         if not self._samples and not waiting and not notes:
             kind = "jumping" if self._only_jumps else "inputs"
-            samples = _FIRST_OF[kind if self._view.space.inputs else "parameters"]
+            moves = any(r.free or r.control_points > 1 for r in self._view.space.inputs)
+            samples = _FIRST_OF[kind if moves else "parameters"]
             first = f"{_FIRST.format(samples)} " if is_own else ""
             if budget is not None:
                 first += f"Nothing has been simulated yet; {counted(budget, 'simulation')} may be spent. "
@@ -241,9 +243,10 @@ class Questions:
         else:
             better = [f"sample {s.number}" for s in ranked[:_NAMED] if s.robustness != ranked[-1].robustness]
             yield f"Lowest robustness so far: {listed(better)}."
-        if any(s.failure for s in self._judged):
-            longest = max(self._judged, key=lambda s: s.failure)
-            yield f"Longest in one piece so far: {number(longest.failure)} s, in sample {longest.number}."
+        longest = max(self._judged, key=lambda s: s.failure)
+        if longest.failure and (found := recurring(self._view.requirement.formula)):
+            failed = f"{number(longest.failure)} s, in sample {longest.number}"
+            yield f"Longest time for which {found.condition} was false in one piece so far: {failed}."
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
             yield "\n".join((*few, *self._climb.lines))
@@ -277,6 +280,7 @@ class Questions:
         """A sample of a variant of our own: how much of it is told depends on those before it only."""
         candidate, verdict = evaluation.candidate, evaluation.verdict
         inputs = self._chosen(candidate)
+        self._tried.add(candidate)
         reason = shortened(" ".join(why.split()), _LONGEST_WHY)
         notes = [self._alike("; ".join(inputs)), f"chosen because: {reason}" if why else ""]
         if verdict is None:
@@ -284,7 +288,6 @@ class Questions:
             text = _text(inputs, ended, *notes)
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         trajectory = evaluation.trajectory
-        self._tried.add(candidate)
         progress = SampleProgress.of(self._view, trajectory) if trajectory else SampleProgress()
         switches = self._reached.switches(progress, trajectory, fine_clock(self._view)) if trajectory else ""
         news = self._reached.news(progress)

@@ -55,10 +55,13 @@ _UNITS = (
     "be harder to change than a large value in another."
 )
 _DISJUNCTION = (
-    "The requirement is a disjunction: it is violated only where all its alternatives fail together. Its "
-    "robustness is the largest of theirs."
+    "The requirement is a disjunction: it is violated only if all its alternatives fail{at_once}. Of "
+    "their robustness values{at_once} the largest counts."
 )
-_RECURRENCE = "The requirement is violated if {condition} stays false for {length} s in one piece."
+_RECURRENCE = (
+    "The requirement is violated if {condition} stays false for {length} s in one piece between t = {start} "
+    "and {end} s."
+)
 _IMPLICATION = (
     "An implication is violated only where its condition is true and its consequence fails: make the "
     "condition true, or keep it so, first."
@@ -293,9 +296,10 @@ def _advice(view: View) -> Iterator[str]:
     if isinstance(inner, And):
         yield _CONJUNCTION
     if isinstance(inner, Or):
-        yield _DISJUNCTION
+        yield _DISJUNCTION.format(at_once=" at one time" * (inner is not formula))
     if found := recurring(formula):
-        yield _RECURRENCE.format(condition=formula_text(found[0]), length=number(found[1]))
+        length, start, end = map(number, found[1:])
+        yield _RECURRENCE.format(condition=formula_text(found.condition), length=length, start=start, end=end)
     if len(formula.predicates) > 1 and len({view.variable(name).unit for name in formula.signals}) > 1:
         yield _UNITS
     if any(isinstance(part, Implies) for part in formula.walk()):
