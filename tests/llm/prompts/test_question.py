@@ -47,6 +47,8 @@ def test_an_empty_history_is_not_described(variant: str) -> None:
     _, changing = told(transmission()[0], variant)
     assert changing.endswith("Propose the first sample.") and "amples so far" not in changing
     assert ("good first samples" in changing) == (variant in ("MP5", "MP6"))
+    _, once = told(lag_problem(points=1), variant)
+    assert "steps" not in once, "there is one value for the whole time"
     texts = "\n".join(told(transmission()[0], variant, transmission()[1:]))
     assert "first samples" not in texts and ("earlier samples" in texts) == (variant in ("MP5", "MP6"))
 
