@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from falsifier.llm.prompts.numbers import decimals_for, plain
+from falsifier.core.words import resolving
+from falsifier.llm.prompts.numbers import decimals_for, number, plain
 
 Array = NDArray[np.float64]
 # Time in s, value, and how far the value may be off.
@@ -195,8 +196,11 @@ def course(
     decimals = decimals_for(off, 2)
     # Rounded up: it is not less than it is told to be.
     within = f"each value within {plain(off + 0.5 * 10.0**-decimals, decimals)}"
-    ends = ((word, int(find(column))) for word, find in (("least", np.argmin), ("greatest", np.argmax)))
-    extremes = ", ".join(f"{word} {column[k]:.5g} at {plain(times[k], clock)} s" for word, k in ends)
+    ends = [(word, int(at)) for word, at in (("least", column.argmin()), ("greatest", column.argmax()))]
+    extremes = ", ".join(
+        f"{word} {number(column[k], resolving(column[k], off / 100, 5))} at {plain(times[k], clock)} s"
+        for word, k in ends
+    )
     if off > _TOO_COARSE * float(np.ptp(column)):
         return f"{extremes}, and too irregular in between to be told"
     return f"{text} ({within}; {extremes})"

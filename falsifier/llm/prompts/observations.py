@@ -82,7 +82,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     monitor = compiled(view.requirement.formula, grid.output_interval, grid.samples)
     diagnosis = monitor.diagnose(trajectory)
     over_time = monitor.courses(trajectory)
-    is_timed = bool(np.nanmax(margin := over_time[diagnosis.path[-1].formula]) > np.nanmin(margin))
+    is_timed = any(np.ptp(trajectory[name]) > 0 for name in diagnosis.path[-1].formula.signals)
     reasons = tuple(_reasons(verdict, diagnosis, is_timed=is_timed))
     parts = tuple(_parts(view, diagnosis, over_time))
     there = (_values_at(view, trajectory, verdict.critical_time, verdict.robustness),) if is_timed else ()
@@ -117,7 +117,7 @@ def _reasons(verdict: Verdict, diagnosis: Diagnosis, *, is_timed: bool) -> Itera
             return
     *above, decider = (step.text for step in diagnosis.path if step.text)
     decided = "; ".join(above) + ": " * bool(above) + _MARGIN.sub("", decider)
-    always = [] if is_timed else ["So it was at all times."]
+    always = [] if is_timed else ["That comparison was the same at all times."]
     yield " ".join((f"why: {decided}.", *always, *(v.text for v in diagnosis.vacuities)))
 
 

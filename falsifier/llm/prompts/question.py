@@ -214,7 +214,8 @@ class Questions:
         waiting = ["; ".join(self._chosen(c)) for c in pending]
         if not self._samples and not waiting and not notes:
             kind = "jumping" if self._only_jumps else "inputs"
-            samples = _FIRST_OF[kind if self._view.space.inputs else "parameters"]
+            moves = any(r.free or r.control_points > 1 for r in self._view.space.inputs)
+            samples = _FIRST_OF[kind if moves else "parameters"]
             first = f"{_FIRST.format(samples)} " if is_own else ""
             if budget is not None:
                 first += f"Nothing has been simulated yet; {counted(budget, 'simulation')} may be spent. "
@@ -245,7 +246,7 @@ class Questions:
         if self._is_flat():
             yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations)
         elif self._recurring and ranked[0].failure:
-            condition, limit = self._recurring
+            condition, limit = self._recurring.condition, self._recurring.length
             longest = [f"{number(s.failure)} s in sample {s.number}" for s in ranked[:_NAMED] if s.failure]
             yield _LONGEST.format(
                 condition=formula_text(condition), longest=", ".join(longest), limit=number(limit)
@@ -289,6 +290,7 @@ class Questions:
         """A sample of a variant of our own: how much of it is told depends on those before it only."""
         candidate, verdict = evaluation.candidate, evaluation.verdict
         inputs = self._chosen(candidate)
+        self._tried.add(candidate)
         reason = shortened(" ".join(why.split()), _LONGEST_WHY)
         notes = [self._alike("; ".join(inputs)), f"chosen because: {reason}" if why else ""]
         if verdict is None:
@@ -296,7 +298,6 @@ class Questions:
             text = _text(inputs, ended, *notes)
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         trajectory = evaluation.trajectory
-        self._tried.add(candidate)
         progress = SampleProgress.of(self._view, trajectory) if trajectory else SampleProgress()
         switches = self._reached.switches(progress, trajectory, fine_clock(self._view)) if trajectory else ""
         news = self._reached.news(progress)

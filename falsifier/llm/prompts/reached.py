@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import fsum
+from math import fsum, inf
 
 import numpy as np
 
@@ -66,7 +66,9 @@ class Reached:
     def news(self, progress: SampleProgress) -> tuple[str, ...]:
         """Add a sample; return the values that no earlier one reached, in words; of the first one nothing."""
         values = sorted(
-            (name, value) for name, before, value in progress.stages - self._stages.keys() if before is None
+            (name, value)
+            for name, before, value in progress.stages - self._stages.keys()
+            if before is None and not self._passed(name, value)
         )
         is_begun = self._stages or self._ranges
         new = self._few([(name, None, value) for name, value in values])
@@ -143,9 +145,16 @@ class Reached:
     def _value(self, name: str, value: float) -> str:
         return self._view.labelled(name, value, plain(value, 6))
 
+    def _passed(self, name: str, value: float) -> bool:
+        """Whether a signal that was not discrete in an earlier sample had this value there."""
+        least, most = self._ranges.get(name, (inf, -inf))
+        return least <= value <= most
+
     def _further(self, progress: SampleProgress) -> Iterator[str]:
         for name, (low, high) in progress.ranges.items():
-            least, most = self._ranges.get(name, (low, high))
+            known = [value for n, before, value in self._stages if n == name and before is None]
+            known += self._ranges.get(name, () if known else (low, high))
+            least, most = min(known), max(known)
             least_new = _FURTHER * (most - least)
             if high > most + least_new:
                 digits = resolving(most, high - most, 3)

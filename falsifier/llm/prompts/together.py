@@ -19,6 +19,15 @@ class NearMiss(NamedTuple):
     others: tuple[Formula, ...]
 
 
+class Recurrence(NamedTuple):
+    """What a requirement is violated by if it fails for long in one piece."""
+
+    condition: Formula
+    length: float  # in s, for which it must fail
+    start: float  # first time in s at which that counts
+    end: float  # and the last one
+
+
 def inside_always(formula: Formula) -> Formula:
     """What must hold at all times."""
     while isinstance(formula, Always):
@@ -26,11 +35,13 @@ def inside_always(formula: Formula) -> Formula:
     return formula
 
 
-def recurring(formula: Formula) -> tuple[Formula, float] | None:
-    """What must be true again and again, and for how long in s it may fail at most; None if nothing must."""
-    inner = inside_always(formula)
-    if isinstance(inner, Eventually) and inner.window and inner is not formula:
-        return inner.operand, inner.window.end - inner.window.start
+def recurring(formula: Formula) -> Recurrence | None:
+    """What must be true again and again; None if nothing must."""
+    inner, start, end = formula, 0.0, 0.0
+    while isinstance(inner, Always) and inner.window:
+        start, end, inner = start + inner.window.start, end + inner.window.end, inner.operand
+    if isinstance(inner, Eventually) and (window := inner.window) and inner is not formula:
+        return Recurrence(inner.operand, window.end - window.start, start + window.start, end + window.end)
     return None
 
 
@@ -39,7 +50,7 @@ def longest_failure(
 ) -> tuple[float, float] | None:
     """First and last time in s of the longest failure of what must recur; None if nothing must, or it did."""
     found = recurring(formula)
-    return None if found is None else longest_stretch(times, over_time[found[0]] < 0)
+    return None if found is None else longest_stretch(times, over_time[found.condition] < 0)
 
 
 def near_misses(formula: Formula, over_time: Mapping[Formula, Array]) -> Iterator[NearMiss]:

@@ -7,13 +7,13 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.ranges import InputRange, ParameterRange
-from falsifier.llm.prompts.numbers import chosen
+from falsifier.llm.prompts.numbers import bounds
 from falsifier.llm.prompts.view import View
 
 # Share of a range that is told if no sample had a value in it.
 _WIDE = 0.3
-# Times at which interpolated inputs are looked at, values that are listed, digits of the others.
-_TIMES, _MOST_LISTED, _DIGITS = 100, 6, 2
+# Values of an interpolated input that count as tried, values that are listed, digits of the others.
+_VALUES, _MOST_LISTED, _DIGITS = 100, 6, 2
 
 
 @dataclass(slots=True)
@@ -25,9 +25,10 @@ class Tried:
 
     def add(self, candidate: Candidate) -> None:
         """Add a sample."""
-        times = np.linspace(0.0, self.view.space.stop_time, _TIMES)
         for name, signal in candidate.signals.items():
-            values = signal.values if signal.interpolation == "constant" else signal.sample(times).tolist()
+            values = signal.values
+            if signal.interpolation != "constant":  # it passes through all between the least and the greatest
+                values = np.linspace(min(values), max(values), _VALUES).tolist()
             self._values.setdefault(name, set()).update(values)
         for name, value in candidate.parameters.items():
             self._values.setdefault(name, set()).add(value)
@@ -40,15 +41,16 @@ class Tried:
 
     def _gap(self, r: InputRange | ParameterRange) -> str:
         tried = sorted(self._values.get(r.name, ()))
-        if r.kind != "real" and r.high - r.low < _TIMES:
+        if r.kind != "real" and r.high - r.low < _VALUES:
             left = [str(n) for n in self._possible(r) if n not in tried]
             listed = ", ".join((*left[:_MOST_LISTED], *(["..."] if len(left) > _MOST_LISTED else [])))
             return f"{r.name} = {listed}" if left else ""
-        shares = np.array([0.0, *r.share_of(np.array(tried)).tolist(), 1.0])
-        widest = int(np.diff(shares).argmax())
-        if shares[widest + 1] - shares[widest] <= _WIDE:
+        edges = [r.low, *tried, r.high]
+        gaps = np.diff(r.share_of(np.array(edges)))
+        widest = int(gaps.argmax())
+        if gaps[widest] <= _WIDE:
             return ""
-        low, high = (chosen(r, r.at(float(share)), _DIGITS) for share in shares[widest : widest + 2])
+        low, high = bounds(edges[widest], edges[widest + 1], _DIGITS)
         return f"{r.name} between {low} and {high}"
 
     def _possible(self, r: InputRange | ParameterRange) -> Iterator[int]:

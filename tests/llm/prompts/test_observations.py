@@ -150,10 +150,13 @@ def test_courses_and_changes_end_where_the_requirement_stops_looking() -> None:
 def test_the_time_that_decided_is_left_out_where_all_times_would_have() -> None:
     view, evaluation = seen("G[0,10] (x <= 2)", np.ones_like(TIMES))
     assert facts(view, evaluation) == [
-        "why: G over [0, 10] s was lowest at 0 s: x = 1 is below 2. So it was at all times.",
+        "why: G over [0, 10] s was lowest at 0 s: x = 1 is below 2. "
+        "That comparison was the same at all times.",
         "x: constant 1",
     ]
     assert not observed(view, evaluation).is_timed
+    (why,) = [t for t in facts(*seen("x <= 2 or G[1,2] (x >= 9)", TIMES / 5)) if t.startswith("why: ")]
+    assert "x = 0 is below 2" in why and "same at all times" not in why
     assert observed(*seen("G[0,10] (x <= 9)", TIMES.copy())).is_timed
 
 

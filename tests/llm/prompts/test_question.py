@@ -8,8 +8,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.model import ModelInfo, Variable
 from falsifier.core.ranges import InputRange, ParameterRange
+from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ChatError
@@ -45,6 +47,8 @@ def test_an_empty_history_is_not_described(variant: str) -> None:
     _, changing = told(transmission()[0], variant)
     assert changing.endswith("Propose the first sample.") and "amples so far" not in changing
     assert ("good first samples" in changing) == (variant in ("MP5", "MP6"))
+    _, once = told(lag_problem(points=1), variant)
+    assert "steps" not in once, "there is one value for the whole time"
     texts = "\n".join(told(transmission()[0], variant, transmission()[1:]))
     assert "first samples" not in texts and ("earlier samples" in texts) == (variant in ("MP5", "MP6"))
 
@@ -229,6 +233,33 @@ def test_of_a_counter_that_rises_far_its_first_values_and_the_last_are_told() ->
         told = reached.switches(progress, trajectory, 0)
         assert re.sub(r" \(.*?\)", "", told) == changes
         assert reached.news(progress) == values
+
+
+def test_a_value_that_a_signal_had_or_passed_when_it_was_not_discrete_is_not_new() -> None:
+    reached = Reached(View.of(PROBLEM))
+    for stages, ranges, new in (
+        ((), {"x": (0.0, 0.0)}, ()),
+        ((0, 2), {}, ("x 2",)),
+        ((), {"x": (0.0, 1.5)}, ()),
+        ((0, 1, 4), {}, ("x 4",)),
+        ((), {"x": (-1.0, 3.5)}, ("x down to -1, before 0",)),
+    ):
+        values = frozenset(("x", None, float(value)) for value in stages)
+        assert reached.news(SampleProgress(values, ranges)) == new
+
+
+def test_what_was_tried_for_a_moment_or_failed_was_tried() -> None:
+    problem, failing = lag_problem(), lag_problem(response=lambda *_: {"x": np.array([np.nan])})
+    for signal, told_ in (
+        (Signal((0.0, 5.01, 5.02, 5.03), (-1.0, -1.0, 0.5321, -1.0), "linear"), ""),
+        (Signal((0.0,), (-0.0321,), "constant"), "Not tried so far: u between -0.0321 and 1."),
+    ):
+        tried = Tried(View.of(problem))
+        tried.add(Candidate({"u": signal}))
+        assert tried.text == told_
+    samples = [*sampled(problem, *2 * [[-1.0] * 4]), *sampled(failing, [0.9] * 4)]
+    _, text = told(problem, "MP5", samples)
+    assert "no verdict" in text and "Not tried so far: u between -1 and 0.9." in text
 
 
 def test_values_that_were_not_tried_are_told_of_each_kind() -> None:

@@ -220,14 +220,21 @@ class TestAdvice:
     @pytest.mark.parametrize(
         ("formula", "told"),
         [
-            ("G[0,9] (x <= 0.9 or x >= 2)", "only where all its alternatives fail together"),
-            ("G[0,5] F[1,3] (x <= 0.9)", "violated if x <= 0.9 stays false for 2 s in one piece"),
+            (
+                "G[0,9] (x <= 0.9 or x >= 2)",
+                "its alternatives fail at one time. Of their robustness values at one time the",
+            ),
+            ("F[0,9] (x <= 0.9) or F[0,9] (x >= 2)", "alternatives fail. Of their robustness values the"),
+            (
+                "G[0,5] F[1,3] (x <= 0.9)",
+                "violated if x <= 0.9 stays false for 2 s in one piece between t = 1 and 8 s",
+            ),
             ("F[1,3] (x <= 0.9)", ""),
         ],
     )
     def test_what_must_fail_together_or_for_long(self, formula: str, told: str) -> None:
         text = self.lines(formula)
-        assert told in text and bool(told) == ("together" in text or "in one piece" in text)
+        assert told in text and bool(told) == ("alternatives" in text or "in one piece" in text)
 
     def test_on_shapes_conditions_and_units_where_they_matter(self) -> None:
         plain = self.lines("G[0,10] (x <= 0.9)")

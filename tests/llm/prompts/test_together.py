@@ -32,6 +32,7 @@ def test_how_close_others_came_while_one_failed(formula: str, told: list[tuple[s
 def test_the_longest_failure_of_what_must_recur() -> None:
     parsed = parse("G[0,5] F[0,4] (y >= 2)")
     over_time = compiled(parsed, 1.0, len(TIMES)).courses(TRAJECTORY)
-    assert recurring(parsed) == (parse("y >= 2"), 4.0)
+    assert recurring(parsed) == (parse("y >= 2"), 4.0, 0.0, 9.0)
+    assert recurring(parse("G[1,2] G[2,3] F[1,3] (y >= 2)")) == (parse("y >= 2"), 2.0, 4.0, 8.0)
     assert longest_failure(parsed, TIMES, over_time) == (4.0, 9.0)
     assert longest_failure(parse("G (y >= 2)"), TIMES, over_time) is None
