@@ -28,8 +28,8 @@ _ROUNDED_DIGITS = 15
 # Digits of the width of a range to which values of signals and parameters are shown.
 _DIGITS_OF_RANGE = 4
 _DIGITS_OF_PARAMETER = 5
-# Below this, numbers are written with exponents, as formulas write them.
-_TINY = 1e-4
+# Below the one and from the other on, numbers are written with exponents, as formulas write them.
+_TINY, _HUGE = 1e-4, 1e15
 # Switches of a signal up to which every one is told; of others those by more than a share of the range.
 _MOST_PIECES = 12
 _ROUGHLY = 0.02
@@ -67,11 +67,13 @@ def coarse_clock(stop_time: float) -> int:
 
 
 def plain(value: float, decimals: int) -> str:
-    """Number with at most that many decimals, without trailing zeros; a tiny one without leading ones.
+    """Number with at most that many decimals, without trailing zeros; a tiny or huge one with an exponent.
 
-    >>> plain(8.3333, 2), plain(50.0, 2), plain(-0.0001, 2), plain(0.00001063, 7)
-    ('8.33', '50', '0', '1.06e-05')
+    >>> plain(8.3333, 2), plain(50.0, 2), plain(-0.0001, 2), plain(0.00001063, 7), plain(2e300, 0)
+    ('8.33', '50', '0', '1.06e-05', '2e+300')
     """
+    if abs(value) >= _HUGE:
+        return number(value, _ROUNDED_DIGITS)
     text = f"{value:.{decimals}f}"
     if "." in text:
         text = text.rstrip("0").rstrip(".")
