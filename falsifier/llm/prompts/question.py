@@ -230,7 +230,8 @@ class Questions:
             yield "\n".join((_PENDING, *waiting))
         if is_own and self._judged:
             what = self._view.chosen
-            is_timed = not (self._is_flat() or self._recurring) and any(s.is_timed for s in self._judged)
+            is_ranked_otherwise = self._is_flat() or self._best_first()[0].failure > 0
+            is_timed = not is_ranked_otherwise and any(s.is_timed for s in self._judged)
             on_time = [_ON_TIME.format(what=what)] if is_timed else []
             on_strategy = _ON_STRATEGY.format(such="" if self._only_jumps else _SUCH)
             yield "\n".join((_ON_OUTPUTS.format(one=what[:-1]), *on_time, on_strategy))
@@ -245,13 +246,13 @@ class Questions:
             return
         if self._is_flat():
             yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations)
-        elif self._recurring and ranked[0].failure:
+        if self._recurring and ranked[0].failure:
             condition, limit = self._recurring.condition, self._recurring.length
             longest = [f"{number(s.failure)} s in sample {s.number}" for s in ranked[:_NAMED] if s.failure]
             yield _LONGEST.format(
                 condition=formula_text(condition), longest=", ".join(longest), limit=number(limit)
             )
-        else:
+        elif not self._is_flat():
             better = [f"sample {s.number}" for s in ranked[:_NAMED] if s.robustness != ranked[-1].robustness]
             yield f"Lowest robustness so far: {listed(better)}."
         if self._climb.is_told:
@@ -266,11 +267,11 @@ class Questions:
         return levels.simulations > 1 and len(levels.found) == 1
 
     def _best_first(self) -> list[_Sample]:
-        """Samples with a verdict by how long what must recur failed, if something must, and their robustness.
+        """Samples with a verdict by how long what must recur failed, if it did, and their robustness.
 
-        Where the robustness is flat, by how far their signals got.
+        Otherwise, where the robustness is flat, by how far their signals got.
         """
-        if self._is_flat():
+        if self._is_flat() and not any(s.failure for s in self._judged):
             return sorted(self._judged, key=lambda s: self._reached.rank(s.progress), reverse=True)
         return sorted(self._judged, key=lambda s: (-s.failure, s.robustness or 0.0, s.number))
 

@@ -305,3 +305,8 @@ def test_samples_are_the_best_by_how_long_what_must_recur_failed() -> None:
     (line,) = re.findall(r"x >= 0\.2 was false .*", changing)
     assert re.match(r".* for \S+ s in sample 2, \S+ s in sample 1; 3 s violate the requirement\.", line)
     assert "Lowest robustness" not in changing and "Look at the time" not in changing
+    # Also where the robustness is the same, as that of a Boolean is however long it was false.
+    flat = lag_problem("G[0,6] F[0,3] (u >= 0.5)")
+    _, changing = told(flat, "MP5", sampled(flat, [1.0, -1.0, -1.0, -1.0], [-1.0] * 4))
+    assert "The robustness is flat" in changing
+    assert re.search(r"u >= 0\.5 was false .* for \S+ s in sample 2, \S+ s in sample 1;", changing)
