@@ -130,6 +130,7 @@ class _Loop:
     count: int = 0
     last_error: str = ""
     last_defect: str = ""
+    asks_llm: bool = False  # whether an engine asks a language model
     is_answered: bool = False
     server: str = ""
     unrecorded: str = ""
@@ -146,6 +147,7 @@ class _Loop:
 
         for state in self.states:
             if isinstance(state.engine, AsksLLM):
+                self.asks_llm = True
                 state.engine.attach(self.exchanged, wrap)
             if isinstance(state.engine, FollowsRun):
                 state.engine.begin(self.budget.simulations)
@@ -230,11 +232,6 @@ class _Loop:
         if all(evaluation.candidate.origin in stand_ins for evaluation in evaluations):
             return "failed", reason if self.count else f"{reason}; nothing was simulated"
         return "not falsified", reason
-
-    @property
-    def asks_llm(self) -> bool:
-        """Whether an engine asks a language model."""
-        return any(isinstance(state.engine, AsksLLM) for state in self.states)
 
     def all_failed(self) -> bool:
         """Whether every simulation so far has failed."""
