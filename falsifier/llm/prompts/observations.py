@@ -1,7 +1,7 @@
 """Everything observed in one sample: what broke or decided it, parts of the formula, signals over time."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -49,7 +49,6 @@ _SIDES: Mapping[type[Formula], str] = {
     Implies: "condition and consequence",
     Iff: "sides",
 }
-_ROBUSTNESS = re.compile(r" robustness ([+-][^ ;]+)")
 _MARGIN = re.compile(r" by [^ ]+$")
 # Maximum number of signals that are not discrete over time; all that are compared come first.
 _MAX_SIGNALS = 16
@@ -84,7 +83,8 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     over_time = monitor.courses(trajectory)
     is_timed = any(np.ptp(trajectory[name]) > 0 for name in diagnosis.path[-1].formula.signals)
     reasons = tuple(_reasons(verdict, diagnosis, is_timed=is_timed))
-    parts = tuple(_parts(view, diagnosis, over_time))
+    told_parts = tuple(_parts(view, diagnosis, over_time))
+    parts = tuple(text for text, _ in told_parts)
     there = (_values_at(view, trajectory, verdict.critical_time, verdict.robustness),) if is_timed else ()
     predicates = [
         *_predicates(view, diagnosis, trajectory, over_time),
@@ -100,7 +100,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     return Observed(
         (*reasons, *there, *parts, *discrete, *predicates, *continuous),
         (*reasons, *parts, *discrete, *predicates, *few_courses),
-        "; ".join((line, *_margins(parts[:1]))),
+        "; ".join((line, *(brief for _, brief in told_parts[:1]))),
         is_timed,
         failure[1] - failure[0] if failure else 0.0,
     )
@@ -168,8 +168,8 @@ def _nearest(view: View, trajectory: Trajectory, over_time: Mapping[Formula, Arr
         yield f"nearest to a violation while {miss.while_so}, at t = {time} s: {'; '.join(words)}"
 
 
-def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[str]:
-    """Robustness of both sides of every connective on the path to the deciding predicate."""
+def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[tuple[str, str]]:
+    """Robustness of both sides of every connective on the path to what decided; the same in numbers alone."""
     above: type[Formula] | None = None
     for step in diagnosis.path:
         kind = type(step.formula)
@@ -180,18 +180,13 @@ def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array])
         sides = links(step.formula) if isinstance(step.formula, And | Or) else step.formula.children
         sample = round(step.time / view.experiment.output_interval)
         words = (_part_text(view, side, over_time, sample) for side in sides)
-        yield f"{_SIDES[kind]} at t = {plain(step.time, fine_clock(view))} s: {'; '.join(words)}"
+        numbers = (signed(over_time[side].item(sample), 4) for side in sides)
+        time = plain(step.time, fine_clock(view))
+        yield f"{_SIDES[kind]} at t = {time} s: {'; '.join(words)}", f"{_SIDES[kind]} {', '.join(numbers)}"
 
 
 def _part_text(view: View, part: Formula, over_time: Mapping[Formula, Array], sample: int) -> str:
     return f"{part} robustness {in_unit(signed(over_time[part].item(sample), 4), _scale(view, part))}"
-
-
-def _margins(parts: Iterable[str]) -> Iterator[str]:
-    """The numbers of what is said of parts, for a line."""
-    for text in parts:
-        sides, _, words = text.partition(" at t = ")
-        yield f"{sides} {', '.join(_ROBUSTNESS.findall(words))}"
 
 
 def _scale(view: View, part: Formula) -> str:

@@ -25,7 +25,7 @@ from falsifier.views.plotting.panels import Panel, panels
 from falsifier.views.text import Labels
 
 # Maximum number of counterexamples of a requirement that are shown.
-MOST_SHOWN = 3
+_MOST_SHOWN = 3
 
 Status = Literal["violated", "no violation found", "no violation confirmed", "not finished", "failed"]
 
@@ -153,7 +153,7 @@ def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
         judged = {run.verdict.robustness: run for run in reversed(runs) if run.verdict is not None}
         found = [judged[min(judged)]] if judged else []
     both = sorted(((run, _shrunk(run)) for run in found), key=lambda b: (b[1] is None, b[0].simulations))
-    shown = [shrunk or shown_of(run, _recorded(run)) for run, shrunk in both[:MOST_SHOWN]]
+    shown = [shrunk or shown_of(run, _recorded(run)) for run, shrunk in both[:_MOST_SHOWN]]
     return section_of(name, by_method, shown, [run for run, _ in both])
 
 
