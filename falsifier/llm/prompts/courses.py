@@ -66,26 +66,19 @@ def change_list(times: Array, column: Array, *, clock: int, label: Label = lambd
 
 
 def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda _, text: text) -> str:
-    """How often each value was entered, and its shortest stay; empty if it changed once at most.
+    """How often each value was entered, and its shortest stay, of those entered twice at least; or empty.
 
     The first interval does not count as entered, and the last one is cut off by the end of the times.
     """
     found = _pieces(times, column)
     words = []
-    for value in sorted({value for value, _, _ in found}) if len(found) > 2 else ():
+    for value in sorted({value for value, _, _ in found}):
         entered = [(start, end) for v, start, end in found[1:] if v == value]
-        complete = entered[:-1] if found[-1][0] == value else entered
-        if complete:
+        if len(entered) > 1:
+            complete = entered[:-1] if found[-1][0] == value else entered
             start, end = min(complete, key=lambda stay: stay[1] - stay[0])
-            count = "once" if len(entered) == 1 else f"{len(entered)} times"
             stay = f"shortest stay {plain(end - start, 3)} s from {plain(start, clock)} s"
-            told = f"entered {count}, {stay}"
-        elif entered:
-            ((start, end),) = entered
-            told = f"entered at {plain(start, clock)} s and still held at {plain(end, clock)} s"
-        else:
-            told = "never entered again"
-        words.append(f"{label(value, plain(value, 6))}: {told}")
+            words.append(f"{label(value, plain(value, 6))}: entered {len(entered)} times, {stay}")
     return "; ".join(words)
 
 
@@ -128,7 +121,8 @@ class Swing(NamedTuple):
         """Interval, period and envelopes in words, times with so many decimals."""
         first, last = self.periods
         changes = max(first, last) > _PERIOD_FACTOR * min(first, last)
-        period = f"{first:.2g} s, at the end {last:.2g} s" if changes else f"{first:.2g} s"
+        begin, end = (plain(p, decimals_for(p, 2)) for p in self.periods)
+        period = f"{begin} s, at the end {end} s" if changes else f"{begin} s"
         return (
             f"oscillates from {plain(self.start, clock)} to {plain(self.end, clock)} s with period {period}, "
             f"between {_pairs(self.lower, clock)} and {_pairs(self.upper, clock)}"

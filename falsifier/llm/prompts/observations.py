@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import in_unit
+from falsifier.core.words import in_unit, listed
 from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts import courses
 from falsifier.llm.prompts.courses import Array
@@ -161,11 +161,11 @@ def _values_at(view: View, trajectory: Trajectory, time: float, robustness: floa
 
 
 def _nearest(view: View, trajectory: Trajectory, over_time: Mapping[Formula, Array]) -> Iterator[str]:
-    """How close others came to failing while one of those failed that must fail together."""
-    for miss in near_misses(view.requirement.formula, over_time):
-        time = plain(trajectory.times[miss.sample], fine_clock(view))
-        words = (_part_text(view, other, over_time, miss.sample) for other in miss.others)
-        yield f"nearest to a violation while {miss.while_so}, at t = {time} s: {'; '.join(words)}"
+    """How close the others came to what is needed while some did what must happen together."""
+    for met, missing, sample in near_misses(view.requirement.formula, over_time):
+        time = plain(trajectory.times[sample], fine_clock(view))
+        words = (_part_text(view, part, over_time, sample) for part in missing)
+        yield f"nearest to a violation while {listed([*map(str, met)])}, at t = {time} s: {'; '.join(words)}"
 
 
 def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[tuple[str, str]]:
@@ -218,22 +218,29 @@ def _predicates(
         margin, times = over_time[predicate][asked], trajectory.times[asked]
         start, end = float(times[0]), float(times[-1])
         wrong = margin < 0
-        stretch = courses.longest_stretch(times, wrong)
         near = int(np.abs(margin).argmin())
         nearest, closest = float(times[near]), f"{shown(abs(margin[near])):.5g}"
-        if stretch is None:
+        if not wrong.any():
             if predicate == diagnosis.path[-1].formula and nearest == diagnosis.critical_time:
                 continue
             found = f"always true, smallest margin {closest} at {plain(nearest, clock)} s"
         elif wrong.all():
             found = f"never true, closest at {plain(nearest, clock)} s, off by {closest}"
-        elif wrong.sum() == 1:
-            found = f"false only at {plain(stretch[0], clock)} s"
         else:
-            begin, stop = (plain(time, clock) for time in stretch)
-            total = number(float(wrong.sum()) * step)
-            found = f"false for about {total} s in total, longest from {begin} to {stop} s"
+            found = _rarer(times, wrong, step, clock)
         yield f"{predicate}, from {plain(start, clock)} to {plain(end, clock)} s: {found}"
+
+
+def _rarer(times: Array, wrong: NDArray[np.bool_], step: float, clock: int) -> str:
+    """When a predicate was false, or when it was true, if that was for less time."""
+    is_mostly_wrong = 2 * wrong.sum() > len(wrong)
+    word, rare = ("true", ~wrong) if is_mostly_wrong else ("false", wrong)
+    stretch = courses.longest_stretch(times, rare)
+    assert stretch is not None, "it was neither always true nor never"
+    begin, end = (plain(time, clock) for time in stretch)
+    if rare.sum() == 1:
+        return f"{word} only at {begin} s"
+    return f"{word} for about {number(float(rare.sum()) * step)} s in total, longest from {begin} to {end} s"
 
 
 def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import one_line
 from falsifier.core.ranges import number_names
-from falsifier.core.words import counted, listed, shortened
+from falsifier.core.words import counted, shortened
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
@@ -42,7 +42,7 @@ _NAMED = 3
 _RUN = re.compile(r'"[^" ]+ x \d+"')
 _PENDING = "Proposed and not simulated so far:"
 _RUNS = '"0 x 187" among the values of a sample stands for 187 zeros.'
-_FIRST = "If what is said of the system suggests how a violation comes about, begin with that; otherwise, {}."
+_FIRST = "If names and descriptions suggest how a violation comes about, begin with that; otherwise, {}."
 _FIRST_OF = {
     "parameters": "the limits of the ranges are good first samples",
     "jumping": (
@@ -55,8 +55,8 @@ _FIRST_OF = {
 }
 _ON_OUTPUTS = "Use the output values of the earlier samples to work out how each {one} affects the outputs."
 _ON_TIME = (
-    "Look at the time that decided each robustness value, and change the {what} so that the signals at that "
-    "time move towards violating the requirement."
+    "Look at the times that decided the robustness values, or at which a violation was nearest, and change "
+    "the {what} so that the signals at such a time move towards violating the requirement."
 )
 _ON_STRATEGY = (
     "As long as samples improve, go on from the best ones, or between two of them. If they stop improving, "
@@ -253,8 +253,9 @@ class Questions:
                 condition=formula_text(condition), longest=", ".join(longest), limit=number(limit)
             )
         elif not self._is_flat():
-            better = [f"sample {s.number}" for s in ranked[:_NAMED] if s.robustness != ranked[-1].robustness]
-            yield f"Lowest robustness so far: {listed(better)}."
+            better = [s for s in ranked[:_NAMED] if s.robustness != ranked[-1].robustness]
+            told = (f"{signed(s.robustness or 0.0, 3)} in sample {s.number}" for s in better)
+            yield f"Lowest robustness so far: {', '.join(told)}."
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
             yield "\n".join((*few, *self._climb.lines))

@@ -13,7 +13,7 @@ from falsifier.context.values import Context
 from falsifier.core.ranges import Freedom, InputRange, ParameterRange
 from falsifier.core.words import counted, listed, with_unit
 from falsifier.llm.prompts.numbers import bounds, decimals_for, number, plain
-from falsifier.llm.prompts.together import inside_always, recurring
+from falsifier.llm.prompts.together import at_one_time, recurring
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl import Formula, in_words
 from falsifier.stl.formula import Always, And, Eventually, Iff, Implies, Next, Not, Or, Predicate, Until
@@ -57,6 +57,10 @@ _UNITS = (
 _DISJUNCTION = (
     "The requirement is a disjunction: it is violated only if all its alternatives fail{at_once}. Of "
     "their robustness values{at_once} the largest counts."
+)
+_TOGETHER = (
+    "What must not happen is a conjunction: the requirement is violated only if all its parts hold at one "
+    "time. Of their robustness values at one time the smallest counts."
 )
 _RECURRENCE = (
     "The requirement is violated if {condition} stays false for {length} s in one piece between t = {start} "
@@ -175,9 +179,8 @@ def _outputs(view: View, start: Mapping[str, tuple[float, float]]) -> Iterator[s
         text = f"- {with_unit(name, known.unit)}{values and f', {values}'}{_described(known.description)}"
         if name in start:
             low, high = start[name]
-            # Some points of the search space show that it depends on these, but not how far it goes.
-            value = view.labelled(name, low, number(low, 5)) if low == high else "depends on what you choose"
-            text += f"; at t = 0: {value}"
+            # Some points of the search space show whether it depends on these, but not how far it goes.
+            text += f"; at t = 0: {view.labelled(name, low, number(low, 5))}" if low == high else ""
         yield f"{text}{_in_files(view, name)}"
     yield _LEGEND.format(end=f" up to {horizon} s" if (horizon := _horizon(view)) else "")
 
@@ -292,10 +295,12 @@ def _in_files(view: View, name: str) -> str:
 def _advice(view: View) -> Iterator[str]:
     """Advice that fits how the requirement is built and what is chosen, from the first sample to the last."""
     formula = view.requirement.formula
-    inner = inside_always(formula)
-    if isinstance(inner, And):
+    inner, must_hold = at_one_time(formula)
+    if isinstance(inner, And) and not must_hold:
         yield _CONJUNCTION
-    if isinstance(inner, Or):
+    if isinstance(inner, And) and must_hold:
+        yield _TOGETHER
+    if isinstance(inner, Or) and not must_hold:
         yield _DISJUNCTION.format(at_once=" at one time" * (inner is not formula))
     if found := recurring(formula):
         length, start, end = map(number, found[1:])

@@ -7,16 +7,28 @@ import numpy as np
 
 from falsifier.llm.prompts.courses import Array, longest_stretch
 from falsifier.stl import Formula
-from falsifier.stl.diagnosis import links
-from falsifier.stl.formula import Always, Eventually, Implies, Or
+from falsifier.stl.formula import Always, And, Eventually, Implies, Not, Or
+
+# Near misses that are told, by what was missing.
+_MOST_MISSES = 4
+
+
+class Side(NamedTuple):
+    """One of what must hold, or fail, at one time so that a requirement is violated."""
+
+    part: Formula
+    must_hold: bool
+
+    def __str__(self) -> str:
+        return f"{self.part} {'holds' if self.must_hold else 'fails'}"
 
 
 class NearMiss(NamedTuple):
-    """When the others were closest to failing while one of those failed that must fail together."""
+    """When a violation was nearest while most did what they must do together, but not all."""
 
-    while_so: str  # what failed, or held if it is the condition of an implication
+    met: tuple[Side, ...]
+    missing: tuple[Formula, ...]
     sample: int
-    others: tuple[Formula, ...]
 
 
 class Recurrence(NamedTuple):
@@ -28,11 +40,17 @@ class Recurrence(NamedTuple):
     end: float  # and the last one
 
 
-def inside_always(formula: Formula) -> Formula:
-    """What must hold at all times."""
-    while isinstance(formula, Always):
-        formula = formula.operand
-    return formula
+def at_one_time(formula: Formula) -> Side:
+    """What must hold, or fail, at some time so that a formula is violated.
+
+    >>> from falsifier.stl import parse
+    >>> str(at_one_time(parse("G not F[0,3] (x >= 2)")))
+    'x >= 2 holds'
+    """
+    must_hold = False
+    while isinstance(formula, Not | (Eventually if must_hold else Always)):
+        must_hold, formula = must_hold != isinstance(formula, Not), formula.operand
+    return Side(formula, must_hold)
 
 
 def recurring(formula: Formula) -> Recurrence | None:
@@ -54,22 +72,39 @@ def longest_failure(
 
 
 def near_misses(formula: Formula, over_time: Mapping[Formula, Array]) -> Iterator[NearMiss]:
-    """The near miss for each of those that must fail together and failed, but not all the time."""
-    inner = inside_always(formula)
-    if isinstance(inner, Or):
-        sides = [(side, f"{side} fails", over_time[side]) for side in links(inner)]
-    elif isinstance(inner, Implies):
-        condition, consequence = inner.children
-        sides = [
-            (condition, f"{condition} holds", -over_time[condition]),
-            (consequence, f"{consequence} fails", over_time[consequence]),
-        ]
-    else:
+    """When as many as ever, but not all, did what they must do together: once for each of those that did not.
+
+    Nothing of those that did so at all times: what was missing then is told without them.
+    """
+    sides = list(_divided(at_one_time(formula)))
+    margins = np.array([-over_time[part] if must_hold else over_time[part] for part, must_hold in sides])
+    asked = ~np.isnan(margins).any(axis=0)
+    is_met = margins < 0
+    is_always_met = np.asarray(is_met[:, asked].all(axis=1))
+    counts = is_met.sum(axis=0) * asked
+    most = int(counts.max())
+    if most in (0, len(sides)):
         return
-    margins = np.array([margin for _, _, margin in sides])
-    for k, (_, while_so, margin) in enumerate(sides):
-        others = np.delete(margins, k, axis=0).max(axis=0)
-        where = np.flatnonzero((margin < 0) & ~np.isnan(others))
-        if len(where) and (margin[~np.isnan(margin)] >= 0).any():
-            rest = tuple(side for i, (side, _, _) in enumerate(sides) if i != k)
-            yield NearMiss(while_so, int(where[others[where].argmin()]), rest)
+    for met in np.unique(is_met[:, counts == most], axis=1).T[::-1][:_MOST_MISSES]:
+        if is_always_met[met].all():
+            continue
+        where = np.flatnonzero((is_met == met[:, None]).all(axis=0) & asked)
+        sample = int(where[margins[~met][:, where].max(axis=0).argmin()])
+        done = tuple(side for side, so in zip(sides, met.tolist(), strict=True) if so)
+        yield NearMiss(done, tuple(side.part for side in sides if side not in done), sample)
+
+
+def _divided(side: Side) -> Iterator[Side]:
+    part, must_hold = side
+    match part:
+        case Not():
+            yield from _divided(Side(part.operand, must_hold=not must_hold))
+        case Implies() if not must_hold:
+            condition, consequence = part.children
+            yield from _divided(Side(condition, must_hold=True))
+            yield from _divided(Side(consequence, must_hold=False))
+        case And() | Or() if must_hold == isinstance(part, And):
+            for child in part.children:
+                yield from _divided(Side(child, must_hold=must_hold))
+        case _:
+            yield side

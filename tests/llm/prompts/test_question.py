@@ -97,7 +97,9 @@ def test_the_best_of_all_samples_are_named_and_stay(monkeypatch: pytest.MonkeyPa
     order = [*range(10, 25), 2, 0, 1, *range(25, 40), *range(3, 10)]  # the best in the middle
     last = asked_each(PROBLEM, [evaluations[n] for n in order])[-1].content
     assert " of 40, in the order in which" in last
-    assert "Lowest robustness so far: sample 17, sample 18 and sample 16." in last
+    assert (
+        "Lowest robustness so far: -0.0397 in sample 17, -0.0305 in sample 18, +0.0247 in sample 16." in last
+    )
     assert all(f"Sample {n}: " in last for n in (16, 17, 18)) and "Sample 15: " not in last
 
 
@@ -148,7 +150,7 @@ def test_on_a_plateau_it_is_told_what_nothing_moved_and_what_was_not_tried() -> 
     _, same = told(problem, "MP5", sampled(problem, still, [0.0] * 7 + [300.0] * 3))
     assert "The same in all samples: gear." in same
     _, other = told(PROBLEM, "MP5", sampled(PROBLEM, [0.0] * 5, [0.5] * 5))
-    assert "flat" not in other and "Lowest robustness so far: sample 2." in other
+    assert "flat" not in other and "Lowest robustness so far: +0.4 in sample 2." in other
 
 
 def test_failed_samples_rationales_lessons_and_inputs_that_look_alike() -> None:
@@ -208,14 +210,14 @@ def test_items_of_an_enumeration_are_named_wherever_its_values_are_told() -> Non
     evaluation = evaluate(problem, problem.space.decode([0] * 4))
     assert evaluation.trajectory is not None
     times = evaluation.trajectory.times
-    steps = ((times >= 5) & (times < 8)).astype(float)
+    steps = (((times >= 5) & (times < 8)) | (times >= 9)).astype(float)
     changed = replace(
         evaluation, trajectory=replace(evaluation.trajectory, columns={"x": steps, "u": 0 * steps})
     )
     standing, changing = told(view, "MP5", [changed], start={"x": (0.0, 0.0)})
     assert "- x, 0 = Idle, 1 = Run; at t = 0: 0 (Idle)" in standing
-    assert "x: 0 (Idle), then 1 (Run) from 5 s, 0 (Idle) from 8 s" in changing
-    assert "x stays: 0 (Idle): entered at 8 s and still held at 10 s; 1 (Run): entered once, " in changing
+    assert "x: 0 (Idle), then 1 (Run) from 5 s, 0 (Idle) from 8 s, 1 (Run) from 9 s" in changing
+    assert "x stays: 1 (Run): entered 2 times, shortest stay 3 s from 5 s" in changing
 
 
 def test_of_a_counter_that_rises_far_its_first_values_and_the_last_are_told() -> None:

@@ -155,7 +155,7 @@ def test_start_values_are_told_if_they_do_not_depend_on_what_is_chosen() -> None
     problem = lag_problem()
     assert "; at t = 0: 0.25\n" in standing(problem, start={"x": (0.25, 0.25)})
     depends = standing(problem, start={"x": (-0.5, 0.5)})
-    assert "at t = 0: depends on what you choose" in depends and "-0.5 to 0.5" not in depends
+    assert "at t = 0: " not in depends
     assert "; at t = 0" not in standing(problem, "MP4", start={"x": (0.25, 0.25)})
 
 

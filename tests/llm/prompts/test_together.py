@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import listed
 from falsifier.evaluation.evaluate import compiled
 from falsifier.llm.prompts.together import longest_failure, near_misses, recurring
 from falsifier.stl import parse
@@ -15,18 +16,27 @@ TRAJECTORY = Trajectory(TIMES, {"x": TIMES.copy(), "y": np.where(TIMES < 4, 5.0,
 @pytest.mark.parametrize(
     ("formula", "told"),
     [
-        ("G (x <= 6 or y <= 2)", [("x <= 6 fails", 7, ["y <= 2"]), ("y <= 2 fails", 3, ["x <= 6"])]),
-        ("G (x >= 7 -> y >= 2)", [("x >= 7 holds", 7, ["y >= 2"]), ("y >= 2 fails", 10, ["x >= 7"])]),
-        ("G (x >= 0 or y <= 2)", [("y <= 2 fails", 0, ["x >= 0"])]),
+        ("G (x <= 6 or y <= 2)", [("x <= 6 fails", 7, "y <= 2"), ("y <= 2 fails", 3, "x <= 6")]),
+        ("G (x >= 7 -> y <= 2)", [("x >= 7 holds", 7, "y <= 2"), ("y <= 2 fails", 3, "x >= 7")]),
+        ("not F (x >= 7 and y >= 3)", [("x >= 7 holds", 7, "y >= 3"), ("y >= 3 holds", 3, "x >= 7")]),
+        (
+            "G (x >= 5 and x <= 9 -> not (x >= 7 and y >= 1))",
+            [("x >= 5 holds, x <= 9 holds and x >= 7 holds", 7, "y >= 1")],
+        ),
+        (
+            "G[0,8] (x >= 5 -> F[0,2] (y >= 2) or x <= 8)",
+            [("x >= 5 holds and F[0,2] (y >= 2) fails", 8, "x <= 8")],
+        ),
+        ("G (x >= 0 or y <= 2)", [("y <= 2 fails", 0, "x >= 0")]),
         ("G (x >= 20 or y <= 9)", []),
         ("G (x <= 6 and y <= 2)", []),
     ],
 )
-def test_how_close_others_came_while_one_failed(formula: str, told: list[tuple[str, int, list[str]]]) -> None:
+def test_how_close_a_violation_was(formula: str, told: list[tuple[str, int, str]]) -> None:
     parsed = parse(formula)
     over_time = compiled(parsed, 1.0, len(TIMES)).courses(TRAJECTORY)
-    found = [(m.while_so, m.sample, [str(o) for o in m.others]) for m in near_misses(parsed, over_time)]
-    assert found == told
+    found = list(near_misses(parsed, over_time))
+    assert [(listed(list(map(str, m.met))), m.sample, ", ".join(map(str, m.missing))) for m in found] == told
 
 
 def test_the_longest_failure_of_what_must_recur() -> None:
