@@ -18,6 +18,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import published
+from falsifier.llm.prompts.advice import on_first, on_next
 from falsifier.llm.prompts.numbers import as_signals, number
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, fine_clock, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
@@ -42,30 +43,6 @@ _NAMED = 3
 _RUN = re.compile(r'"[^" ]+ x \d+"')
 _PENDING = "Proposed and not simulated so far:"
 _RUNS = '"0 x 187" among the values of a sample stands for 187 zeros.'
-_FIRST = "If names and descriptions suggest how a violation comes about, begin with that; otherwise, {}."
-_FIRST_OF = {
-    "parameters": "the limits of the ranges are good first samples",
-    "jumping": (
-        "go once through all values, each held for long enough, which shows what the system does with them"
-    ),
-    "inputs": (
-        "the limits of the ranges are good first samples, and so are steps that are far apart, or a slow run "
-        "through a whole range, which show how and where the system reacts"
-    ),
-}
-_ON_OUTPUTS = "Use the output values of the earlier samples to work out how each {one} affects the outputs."
-_ON_TIME = (
-    "Look at the times that decided the robustness values, or at which a violation was nearest, and change "
-    "the {what} so that the signals at such a time move towards violating the requirement."
-)
-_ON_STRATEGY = (
-    "As long as samples improve, go on from the best ones, or between two of them. If they stop improving, "
-    "do not just repeat the best one with small changes, but try a different strategy{such}."
-)
-_SUCH = (
-    ", such as a single short pulse, a small amplitude, a slow change or a faster repetition; the limits of "
-    "the ranges are not always the worst, as values just short of what the system reacts to may be"
-)
 _LONGEST = (
     "{condition} was false longest in one piece for {longest}; {limit} s violate the requirement. That tells "
     "more than the robustness: look at how that piece began and ended."
@@ -119,7 +96,6 @@ class Questions:
         self._reached = Reached(view)
         self._tried = Tried(view)
         self._recurring = recurring(view.requirement.formula)
-        self._only_jumps = all(r.kind != "real" for r in view.space.inputs)
         self._climb = Climb(_counting(view), "sample")
 
     def tell(self, evaluation: Evaluation, *, doubt: str = "", why: str = "") -> None:
@@ -137,6 +113,11 @@ class Questions:
             self._samples.append(sample)
             if sample.robustness is not None:
                 self._judged.append(sample)
+            if evaluation.trajectory is not None:  # the start values of a few points do not show everything
+                at_start = evaluation.trajectory.at(0.0)
+                for name in self._start.keys() & at_start.keys():
+                    values = (*self._start[name], at_start[name])
+                    self._start[name] = (min(values), max(values))
             self._shorten()
 
     def ask(
@@ -213,10 +194,7 @@ class Questions:
         is_own = not self._variant.is_published
         waiting = ["; ".join(self._chosen(c)) for c in pending]
         if not self._samples and not waiting and not notes:
-            kind = "jumping" if self._only_jumps else "inputs"
-            moves = any(r.free or r.control_points > 1 for r in self._view.space.inputs)
-            samples = _FIRST_OF[kind if moves else "parameters"]
-            first = f"{_FIRST.format(samples)} " if is_own else ""
+            first = f"{on_first(self._view.space)} " if is_own else ""
             if budget is not None:
                 first += f"Nothing has been simulated yet; {counted(budget, 'simulation')} may be spent. "
             yield f"{first}Propose the first {wanted}."
@@ -229,12 +207,10 @@ class Questions:
         if waiting:
             yield "\n".join((_PENDING, *waiting))
         if is_own and self._judged:
-            what = self._view.chosen
-            is_ranked_otherwise = self._is_flat() or self._best_first()[0].failure > 0
+            is_flat = self._is_flat()
+            is_ranked_otherwise = is_flat or self._best_first()[0].failure > 0
             is_timed = not is_ranked_otherwise and any(s.is_timed for s in self._judged)
-            on_time = [_ON_TIME.format(what=what)] if is_timed else []
-            on_strategy = _ON_STRATEGY.format(such="" if self._only_jumps else _SUCH)
-            yield "\n".join((_ON_OUTPUTS.format(one=what[:-1]), *on_time, on_strategy))
+            yield on_next(self._view.space, is_timed=is_timed, is_flat=is_flat)
         if is_own and _RUN.search(self._lasting()):
             yield _RUNS
         yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
@@ -301,6 +277,7 @@ class Questions:
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         trajectory = evaluation.trajectory
         progress = SampleProgress.of(self._view, trajectory) if trajectory else SampleProgress()
+        is_first = self._reached.is_new(progress)
         switches = self._reached.switches(progress, trajectory, fine_clock(self._view)) if trajectory else ""
         news = self._reached.news(progress)
         self._climb.add(self._told, verdict, trajectory, self._view.requirement.formula.predicates)
@@ -310,7 +287,7 @@ class Questions:
             robustness += f" ({margin_words(verdict.robustness, verdict.predicate)})"
         reached = f"the first to reach: {'; '.join(news)}" if news else ""
         head = (robustness, doubt, *notes, reached)
-        changes = f"new changes: {switches}" if switches else ""
+        changes = f"changes, with all else then: {switches}" if switches else ""
         brief = inputs if why else as_signals(self._view, candidate, in_brief=True)
         texts = (
             _text(inputs, *head, changes, *found.full),
@@ -318,7 +295,7 @@ class Questions:
             _text(brief, *head, found.line),
         )
         best = min((s.robustness for s in self._judged if s.robustness is not None), default=None)
-        is_first = bool(news or switches)
+        is_first = is_first or bool(news)
         depth = _FULL if is_first or best is None or verdict.robustness < best else _SHORT
         tokens = tuple(map(self._count, texts))
         return _Sample(
@@ -362,9 +339,19 @@ class Questions:
         return sum(s.tokens[s.depth] for s in self._samples)
 
     def _lightest_first(self) -> list[_Sample]:
-        """The oldest ones first, then those that were first somewhere; at the end those named as the best."""
-        weights = {s.number: _NAMED - place for place, s in enumerate(self._best_first()[:_NAMED])}
-        return sorted(self._samples, key=lambda s: (weights.get(s.number, 0), s.is_first, s.number))
+        """The oldest ones first, then those that were first somewhere, and those as low as the best one.
+
+        At the end those named as the best, and the latest one, which nothing has been learnt from yet.
+        """
+        best = self._best_first()[:_NAMED]
+        weights = {s.number: _NAMED - place for place, s in enumerate(best)}
+
+        def weight(sample: _Sample) -> tuple[bool, int, bool, bool, int]:
+            is_lowest = bool(best) and sample.robustness == best[0].robustness
+            named = weights.get(sample.number, 0)
+            return sample is self._samples[-1], named, is_lowest, sample.is_first, sample.number
+
+        return sorted(self._samples, key=weight)
 
     def _chosen(self, candidate: Candidate) -> tuple[str, ...]:
         if not self._variant.is_published:
@@ -379,6 +366,10 @@ def _text(inputs: Sequence[str], *lines: str) -> str:
 
 
 def _counting(view: View) -> dict[str, dict[int, str]]:
-    """Recorded signals that may count up, with the names of their values; none where no types are told."""
+    """Signals that may count up, with the names of their values; none where no types are told.
+
+    Those of the requirement, or all recorded ones if none of them may.
+    """
     recorded = map(view.variable, view.recorded)
-    return {v.name: number_names(v.kind, v.items) for v in recorded if v.kind in ("integer", "enumeration")}
+    may = {v.name: number_names(v.kind, v.items) for v in recorded if v.kind in ("integer", "enumeration")}
+    return {name: may[name] for name in view.formula_outputs if name in may} or may

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import fsum, inf
+from typing import TypeVar
 
 import numpy as np
 
@@ -15,6 +16,8 @@ from falsifier.llm.prompts.view import View
 
 # A value or a change of a discrete signal: its name, the value before, the value.
 Stage = tuple[str, float | None, float]
+
+T = TypeVar("T")
 
 # A signal went further if it left the range seen so far by more than this share of it.
 _FURTHER = 0.05
@@ -30,7 +33,7 @@ class SampleProgress:
 
     stages: frozenset[Stage] = frozenset()
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    # Changes by the index at which each came first.
+    # Changes by the index at which each came first; of signals of the requirement, also again.
     changes: Mapping[int, tuple[Stage, ...]] = field(default_factory=dict)
 
     @classmethod
@@ -45,9 +48,10 @@ class SampleProgress:
             if view.is_discrete(name, column):
                 begun = np.flatnonzero(np.diff(column, prepend=np.nan)).tolist()
                 stages |= {(name, None, value) for value in column[begun].tolist()}
+                told = _ends(begun[1:]) if name in view.formula_outputs else ()
                 for before, k in pairwise(begun):
                     change = (name, float(column[before]), float(column[k]))
-                    if change not in stages:
+                    if change not in stages or k in told:
                         stages.add(change)
                         changes[k] = (*changes.get(k, ()), change)
             elif np.isfinite(column).all():
@@ -79,12 +83,21 @@ class Reached:
             self._ranges[name] = (min(low, least), max(high, most))
         return (*found[:_MOST_NEW], *(["..."] if len(found) > _MOST_NEW else []))
 
+    def is_new(self, progress: SampleProgress) -> bool:
+        """Whether a discrete signal made a change that it made in no earlier sample."""
+        return any(c not in self._stages for changes in progress.changes.values() for c in changes)
+
     def switches(self, progress: SampleProgress, trajectory: Trajectory, clock: int) -> str:
         """When discrete signals made changes that no earlier sample made, and all else of that time.
 
-        It is to be called before the sample is added; ``clock`` is the number of decimals of times.
+        Those of the requirement also where earlier samples made the same. It is to be called before the
+        sample is added; ``clock`` is the number of decimals of times.
         """
-        new = {k: [c for c in changes if c not in self._stages] for k, changes in progress.changes.items()}
+        judged = self._view.formula_outputs
+        new = {
+            k: [c for c in changes if c not in self._stages or c[0] in judged]
+            for k, changes in progress.changes.items()
+        }
         few = self._few([change for changes in new.values() for change in changes])
         discrete = {name for name, _, _ in progress.stages}
         inputs = [r.name for r in self._view.space.inputs if r.name in trajectory.columns]
@@ -123,8 +136,7 @@ class Reached:
         by_name: dict[str, list[Stage]] = {}
         for stage in stages:
             by_name.setdefault(stage[0], []).append(stage)
-        few = (found[: _MOST_OF_ONE - 1] + found[_MOST_OF_ONE - 1 :][-1:] for found in by_name.values())
-        return [stage for found in few for stage in found]
+        return [stage for found in by_name.values() for stage in _ends(found)]
 
     def rank(self, progress: SampleProgress) -> tuple[float, float]:
         """How far a sample got: its stages, of which rare ones count more; then the share of all ranges."""
@@ -162,3 +174,8 @@ class Reached:
             if low < least - least_new:
                 digits = resolving(least, least - low, 3)
                 yield f"{name} down to {number(low, digits)}, before {number(least, digits)}"
+
+
+def _ends(found: Sequence[T]) -> Sequence[T]:
+    """The first ones and the last one."""
+    return [*found[: _MOST_OF_ONE - 1], *found[_MOST_OF_ONE - 1 :][-1:]]
