@@ -38,6 +38,7 @@ SYSTEMS = ("AT1", "CC4", "CCx", "NN", "F16", "SC")
 COMPARED = (*SYSTEMS, "AT51", "AT6a", "AFC27", "PulseMeter", "HeaterLimpHome", "ChargerHandshake")
 SAMPLES = (0, 1, 5, 20)
 Array = NDArray[np.float64]
+_REGULAR = re.compile(r"by (\S+) every (\S+) s to (\S+)")
 _OSCILLATION = re.compile(r"oscillates from (\S+) to (\S+) s with period .*?, between (.*?) and (.*)")
 _WITHIN = re.compile(r" \(each value within (\S+); least \S+ at \S+ s, greatest \S+ at \S+ s\)$")
 
@@ -122,15 +123,22 @@ def _compared(name: str, text: str, times: Array, column: Array, stated: float, 
 def _changes(name: str, text: str, times: Array, column: Array) -> Told:
     """A list of changes; values with the name of an item are compared by their numbers."""
     first, _, rest = text.partition(", then ")
-    error, value = np.zeros_like(times), np.full_like(times, float(first.split(" ")[0]))
+    last, start = float(first.split(" ")[0]), 0.0
+    error, value = np.zeros_like(times), np.full_like(times, last)
+    early = 0.5 * float(times[1] - times[0])
     for change in rest.split(", "):
         if "more changes" in change:  # what follows is told, what is left out is not
-            value[:] = np.nan
+            value[:], start = np.nan, np.nan
             continue
         number, _, at = change.partition(" from ")
-        value[times > float(at.removesuffix(" s")) - 0.5 * (times[1] - times[0])] = float(
-            number.split(" ")[0]
-        )
+        end, regular = float(at.removesuffix(" s")), _REGULAR.match(number)
+        if regular and not np.isnan(start):
+            by, every = map(float, regular.groups()[:2])
+            for _ in range(round((end - start) / every)):
+                last, start = last + by, start + every
+                value[times > start - early] = last
+        last, start = float(regular[3] if regular else number.split(" ")[0]), end
+        value[times > start - early] = last
     error = np.nan_to_num(np.abs(value - column))
     return Told(name, 0.0, float(error.max()), float(np.ptp(column)))
 

@@ -3,7 +3,7 @@
 Pure functions of a time grid, shape (n,) in s, and a column, shape (n,).
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from heapq import heapify, heappop, heappush
 from itertools import pairwise, zip_longest
 from typing import NamedTuple
@@ -20,8 +20,10 @@ Points = tuple[tuple[float, float, float], ...]
 
 # Changes listed individually; of longer lists the beginning and the end.
 SHOWN_CHANGES = 16
+# So many changes by the same amount, after the same time, are told together.
+_REGULAR = 4
 # Breakpoints of one signal; a signal that needs more is told less exactly, and how exactly.
-MOST_BREAKPOINTS = 24
+MOST_BREAKPOINTS = 40
 _MOST_ENVELOPE_POINTS = 16
 # Share of a tolerance that straight lines use up; the digits of the values have the rest.
 _OF_LINES, _OF_DIGITS = 0.7, 0.6
@@ -57,12 +59,31 @@ def change_list(times: Array, column: Array, *, clock: int, label: Label = lambd
     begin = label(first[0], plain(first[0], 6))
     if not rest:
         return f"constant {begin}"
-    changes = [f"{label(v, plain(v, 6))} from {plain(start, clock)} s" for v, start, _ in rest]
+    changes = list(_changes([(value, start) for value, start, _ in rest], clock, label))
+    half = SHOWN_CHANGES // 2
     if len(changes) > SHOWN_CHANGES:
-        half = SHOWN_CHANGES // 2
-        left_out = f"{len(changes) + 1 - 2 * half} more changes"
-        changes = [*changes[: half - 1], left_out, *changes[-half:]]
-    return f"{begin}, then {', '.join(changes)}"
+        hidden = sum(count for _, count in changes[half - 1 : -half])
+        changes = [*changes[: half - 1], (f"{hidden} more changes", hidden), *changes[-half:]]
+    return f"{begin}, then {', '.join(text for text, _ in changes)}"
+
+
+def _changes(begun: Sequence[tuple[float, float]], clock: int, label: Label) -> Iterator[tuple[str, int]]:
+    """Values and the times in s at which they begin, in words, with their number; regular ones together."""
+    steps: Array = np.diff(np.array(begun), axis=0)
+    alike = np.asarray(np.isclose(steps[1:], steps[:-1], rtol=1e-6).all(axis=1))
+    k = 0
+    while k < len(begun):
+        value, start = begun[k]
+        yield f"{label(value, plain(value, 6))} from {plain(start, clock)} s", 1
+        count = 0
+        while k + count < len(steps) and (count == 0 or alike[k + count - 1]):
+            count += 1
+        if count >= _REGULAR:
+            (by, every), (last, end) = steps[k].tolist(), begun[k + count]
+            then = label(last, plain(last, 6))
+            yield f"by {by:+.6g} every {number(every, 6)} s to {then} from {plain(end, clock)} s", count
+            k += count
+        k += 1
 
 
 def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda _, text: text) -> str:

@@ -32,8 +32,12 @@ def test_change_list() -> None:
     assert change_list(TIMES, GEAR, clock=2) == told
     assert change_list(TIMES, np.full_like(TIMES, 3.0), clock=2) == "constant 3"
     for count, left_out in ((16, []), (17, ["2 more changes"])):
-        changes = change_list(TIMES, np.minimum(np.arange(1001) // 10, count) * 1.0, clock=2).split(", ")
+        squares = np.minimum(np.sqrt(np.arange(1001)) // 1, count)
+        changes = change_list(TIMES, squares, clock=2).split(", ")
         assert [each for each in changes if "more" in each] == left_out
+    counted = steps((0, 5), (1, 4), (2, 4.5), *((t, t + 2) for t in range(3, 9)), (9.5, 0))
+    told = "5, then 4 from 1 s, 4.5 from 2 s, 5 from 3 s, by +1 every 1 s to 10 from 8 s, 0 from 9.5 s"
+    assert change_list(TIMES, counted, clock=2) == told
     long = change_list(TIMES, (np.arange(1001) // 10 % 2).astype(np.float64), clock=2)
     assert long.startswith("0, then 1 from 0.1 s") and "85 more changes" in long and long.endswith("10 s")
 
