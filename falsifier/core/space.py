@@ -6,7 +6,7 @@ between vectors and candidates.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, prod
+from math import inf, isfinite, prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,12 +148,13 @@ class SearchSpace:
         """Return the candidate for a point of the box, shape (d,).
 
         Raises:
-            CandidateError: if the vector has the wrong length or is outside the box by more than rounding.
+            CandidateError: if the length is wrong, a number is NaN, or outside the box by more than rounding.
         """
         values = [float(v) for v in vector]
         expected = sum(r.control_points for r in self.inputs) + len(self.parameters)
-        if len(values) != expected:
-            raise CandidateError(f"expected {expected} numbers, got {len(values)}")
+        got = next((v for v in values if not isfinite(v)), len(values))
+        if got != expected:
+            raise CandidateError(f"expected {expected} finite numbers, got {got}")
         signals = {}
         start = 0
         for r in self.inputs:
@@ -273,8 +274,8 @@ def _signal_outside(r: InputRange, signal: Signal) -> str:
         return ""
     if len(set(values)) == 1 < len(values):
         return f"{r.label}: {values[0]:.12g} is {outside_text(r)}"
-    shown = found[:_SHOWN_VALUES]
-    more = f" and {len(found) - len(shown)} more" if len(found) > len(shown) else ""
-    at, what = (", ".join(f"{pair[k]:.12g}" for pair in shown) for k in (0, 1))
-    verb = "is" if len(found) == 1 else "are"
-    return f"{r.label} at t = {at} s{more}: {what}{more} {verb} {outside_text(r)}"
+    from falsifier.core.words import first_few  # a module that imports this one
+
+    at = first_few([f"{time:.12g} s" for time, _ in found], _SHOWN_VALUES)
+    what = first_few([f"{value:.12g}" for _, value in found], _SHOWN_VALUES)
+    return f"{r.label} at t = {at}: {what} {'is' if len(found) == 1 else 'are'} {outside_text(r)}"
