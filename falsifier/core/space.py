@@ -274,8 +274,8 @@ def _signal_outside(r: InputRange, signal: Signal) -> str:
         return ""
     if len(set(values)) == 1 < len(values):
         return f"{r.label}: {values[0]:.12g} is {outside_text(r)}"
-    from falsifier.core.words import first_few  # a module that imports this one
-
-    at = first_few([f"{time:.12g} s" for time, _ in found], _SHOWN_VALUES)
-    what = first_few([f"{value:.12g}" for _, value in found], _SHOWN_VALUES)
-    return f"{r.label} at t = {at}: {what} {'is' if len(found) == 1 else 'are'} {outside_text(r)}"
+    shown = found[:_SHOWN_VALUES]
+    more = f" and {len(found) - len(shown)} more" if len(found) > len(shown) else ""
+    at, what = (", ".join(f"{pair[k]:.12g}" for pair in shown) for k in (0, 1))
+    verb = "is" if len(found) == 1 else "are"
+    return f"{r.label} at t = {at} s{more}: {what}{more} {verb} {outside_text(r)}"

@@ -77,7 +77,7 @@ def changed(**changes: Any) -> dict[str, Any]:
         ('{"point": [0, 0, 0, 0, 0, 1e999]}', "finite number"),
         (
             {"point": [-1, 0, 101, 0, 0, 2000]},
-            r"'throttle' at t = 0 s, 10 s: -1, 101 are outside .*; parameter 'mass'",
+            r"'throttle' at t = 0, 10 s: -1, 101 are outside .*; parameter 'mass'",
         ),
         (
             changed(signals=[{"name": "throttle", "values": [101]}, GOOD["signals"][1]]),
