@@ -136,7 +136,7 @@ _KEYS: Mapping[str, _Told] = {
         "simulation_seconds": ("number", "time in the simulator in s"),
         "engine_seconds": ("number", "time in the engine in s, including the language model"),
         "calls": ("integer", "requests to a language model that were answered or timed out"),
-        "without_reply": ("integer", "those that timed out, or whose answer cannot be read"),
+        "without_reply": ("integer", "those in vain: too late, interrupted, or not readable"),
         "kept": ("integer", "replies from the cache, without a request"),
         "prompt_tokens": ("integer", "tokens sent"),
         "completion_tokens": ("integer", "tokens received, including reasoning"),

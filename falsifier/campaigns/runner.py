@@ -95,8 +95,7 @@ def resume_campaign(
     instance("limits", limits, (Budget, type(None)), "a Budget")
     with campaign_lock(directory):
         record = read_campaign(directory)
-        for run in record.request.runs:
-            check_llm(directory, run.llm)
+        check_llm(directory, *(run.llm for run in record.request.runs))
         sources = (run.problems[0] for run in record.request.runs)
         with manifest.loading(directory, sources, record.hashes):
             problems = _load(record.request.runs)

@@ -93,8 +93,8 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
         raise SpecError(f"{spec} is a spec, not an FMU; to check it: {command}")
     for nameless in (f for f in fmus if not f.name):  # "." and "/", beside which no spec can be named
         _existing_fmu(nameless)
-    path = out or (fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml"))
-    in_existing_folder(path)
+    usual = fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml")
+    path = in_existing_folder(out or usual)
     if path.exists():
         raise SpecError(f"{path} already exists: choose another --out, or delete it first")
     text = _starter(fmus, path)

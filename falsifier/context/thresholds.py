@@ -14,10 +14,10 @@ _BOUNDING = "and or not && || ! if then else elseif when elsewhen while for loop
 _BOUNDARIES = frozenset(_BOUNDING.split())
 _DECIMAL = r"(?:\d++\.?\d*+|\.\d++)(?:[eE][-+]?\d++)?"
 _HEXADECIMAL = r"0[xX][0-9a-fA-F]++(?:\.?[0-9a-fA-F]*+[pP][-+]?\d++)?"
-_NUMBER = re.compile(rf"([-+]?)(?:({_HEXADECIMAL})|({_DECIMAL}))[fFlLuU]*$")
-# (float)7.2; with a sign, only names of numeric types, as (limit)-3 is a difference.
-_TYPE = r"(?:u?int|float|real|double|single)\d*+(?:_[tT])?"
-_CAST = rf"\(\s*+(?:{_TYPE}\s*+\)\s*+(?=[-+]?\.?\d)|[^\W\d]\w*+\s*+\)\s*+(?=\.?\d))"
+_NUMBER = re.compile(rf"([-+]?) ?(?:({_HEXADECIMAL})|({_DECIMAL}))[fFlLuU]*$")
+# (unsigned int)7; with a sign, only names of numeric types, as (limit)-3 is a difference.
+_TYPE = r"(?:(?:u?int|float|real|double|single)\d*+(?:_[tT])?|(?:un)?signed|long|short|char)\b"
+_CAST = rf"\(\s*+(?:(?:{_TYPE}\s*+){{1,4}}+\)\s*+(?=[-+]?\.?\d)|(?:[^\W\d]\w*+\s*+){{1,4}}+\)\s*+(?=\.?\d))"
 _MAX_LENGTH = 160
 OPENING, CLOSING = frozenset("([{"), frozenset(")]}")
 # Every alternative either takes what it has looked at or gives up after a limited number of characters, so
@@ -127,7 +127,7 @@ def _threshold(
     levels: tuple[float, ...] = ()
     for side, other in (sides, sides[::-1]):
         if variables == {path for path, _ in _variables(side, is_dotted=is_dotted)} and _is_name(side):
-            constant = "".join(token.text for token in other)
+            constant = " ".join(token.text for token in other)
             levels = tuple(_numbers(stated_values if _is_name(other) else [constant]))
     said = f" ({', '.join(f'{n} = {v}' for n, v in named.items())})" if named else ""
     return Threshold(variables, f"{shown}{said}", levels, place)
@@ -136,7 +136,7 @@ def _threshold(
 def _numbers(texts: Iterable[str]) -> Iterator[float]:
     """Return those of some texts that are nothing but a number, and none that is too large for one."""
     for text in texts:
-        if found := _NUMBER.match("".join(token.text for token in tokens_of(text)).strip("()")):
+        if found := _NUMBER.match(" ".join(token.text for token in tokens_of(text)).strip("() ")):
             sign, hexadecimal, decimal = found.groups()
             with suppress(OverflowError):
                 number = float(decimal) if decimal else float.fromhex(hexadecimal)

@@ -14,6 +14,8 @@ from falsifier.errors import SpecError
 
 # Relative tolerance for one time to be a multiple of another: rounding leaves no exact multiple of 1/30 s.
 GRID_ROUNDING = 1e-6
+# Maximum number of steps of each kind per simulation; trajectories have one sample per output interval.
+MAX_STEPS = 10_000_000
 # Largest denominator of times like 1/30 s, which are written with many digits.
 _MAX_DENOMINATOR = 100_000
 _ROUNDING = 1e-12
@@ -38,6 +40,12 @@ def common_part(*times: Fraction) -> Fraction:
 
 def whole_steps(what: str, whole: float, part: str, period: float, *, key: str = "") -> int:
     """Return how many times a period fits into a time; SpecError, with a round shorter one that does."""
+    if not whole / period < MAX_STEPS + 1:
+        raise SpecError(
+            f"{what} = {whole:.12g} s has more than {MAX_STEPS:,} times {part} = {period:g} s; the smallest "
+            f"value is {whole / MAX_STEPS:g}",
+            key=key or part,
+        )
     count = max(round(whole / period), 1)
     if abs(whole / period - count) > GRID_ROUNDING * count:
         least = ceil(whole / period)

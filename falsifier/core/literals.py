@@ -13,9 +13,14 @@ from decimal import Decimal
 from io import StringIO
 from math import isfinite
 
-# What UTF-8 or XML 1.0 cannot contain, control characters other than tab and newline, and those that reverse
-# the direction of what follows.
-_UNPRINTABLE = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
+# Control characters other than tab and newline, and characters that hide or reorder text.
+_ACTING = (
+    r"\x00-\x08\x0b-\x1f\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
+    r"\U000e0000-\U000e007f"
+)
+_CONTROLS = re.compile(f"[{_ACTING}]")
+# These, and what UTF-8 or XML 1.0 cannot contain.
+_UNPRINTABLE = re.compile(rf"[{_ACTING}\ud800-\udfff\ufffe\uffff]")
 # What cannot be part of a string in any language.
 _UNWRITABLE = re.compile("[\x00\ud800-\udfff]")
 _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
@@ -24,10 +29,6 @@ _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 _SEQUENCES = re.compile(
     r"(?:\x1b\[|\x9b)[0-?]*[ -/]*[@-~]"
     r"|(?:\x1b[\]PX^_]|[\x90\x98\x9d-\x9f])[^\x07\x1b\x80-\x9f\n]*(?:\x07|\x1b\\|\x9c)"
-)
-# All other control characters except newline and tab, and characters that hide or reorder text.
-_CONTROLS = re.compile(
-    r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\U000e0000-\U000e007f]"
 )
 _FORMULA_STARTS = tuple("=+-@＝＋－＠\t\n")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
@@ -51,10 +52,10 @@ def printable(text: str) -> str:
 
 
 def plain(text: str) -> str:
-    r"""Return a text without control characters and characters that no file can hold; lines stay lines.
+    r"""Return a text without control characters, invisible ones and those that no file can hold; lines stay.
 
-    >>> plain("a\x1b[31mb")
-    'a�[31mb'
+    >>> plain("a\x1b[31mb\u200bc")
+    'a�[31mb�c'
     """
     return _UNPRINTABLE.sub(_REPLACEMENT, text)
 

@@ -26,6 +26,7 @@ _TYPE_LIMITS: Mapping[str, tuple[int, int]] = {
     "Integer": (-(2**31), 2**31 - 1),
     **{f"Int{b}": (-(2 ** (b - 1)), 2 ** (b - 1) - 1) for b in (8, 16, 32, 64)},
     **{f"UInt{b}": (0, 2**b - 1) for b in (8, 16, 32, 64)},
+    "Float32": (2**104 - 2**128, 2**128 - 2**104),
 }
 # The largest integer that no other one becomes as a double.
 _EXACT = 2**53 - 1
@@ -105,7 +106,7 @@ class Variable:
 
     @property
     def type_limits(self) -> tuple[int, int] | None:
-        """Smallest and largest number of its data type; None for reals and unknown types."""
+        """Smallest and largest number of its data type; None for doubles and unknown types."""
         return _TYPE_LIMITS.get(self.type)
 
     @property

@@ -6,7 +6,7 @@ between vectors and candidates.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, prod
+from math import inf, isfinite, prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -148,12 +148,13 @@ class SearchSpace:
         """Return the candidate for a point of the box, shape (d,).
 
         Raises:
-            CandidateError: if the vector has the wrong length or is outside the box by more than rounding.
+            CandidateError: if the length is wrong, a number is NaN, or outside the box by more than rounding.
         """
         values = [float(v) for v in vector]
         expected = sum(r.control_points for r in self.inputs) + len(self.parameters)
-        if len(values) != expected:
-            raise CandidateError(f"expected {expected} numbers, got {len(values)}")
+        got = next((v for v in values if not isfinite(v)), len(values))
+        if got != expected:
+            raise CandidateError(f"expected {expected} finite numbers, got {got}")
         signals = {}
         start = 0
         for r in self.inputs:

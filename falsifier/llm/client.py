@@ -128,6 +128,7 @@ class LiteLLMChat:
                         raise ChatError(f"a limit is reached. {error}") from None
                     self._wait(failures, request)
         except BaseException as error:  # Ctrl-C, too
+            lost += [own] if (own := getattr(error, "lost", None)) else []
             if lost:
                 error.lost = sum(lost[1:], lost[0])  # type: ignore[attr-defined]
             raise
@@ -238,6 +239,9 @@ class LiteLLMChat:
             seconds = timeout if left is None else min(timeout, left)
             never = () if is_of_openai else (litellm_adapter.HOST_OF_OPENAI,)
             return cleaned(within(seconds, ask, never=never, withheld=withheld, dropped=dropped), secrets)
+        except KeyboardInterrupt as stop:  # the provider charges for what it has been sent, or has answered
+            stop.lost = self._lost(request, without_reply=1)  # type: ignore[attr-defined]
+            raise
         except Exception as error:  # litellm raises its own errors, its clients' and plain built-in ones
             failure = classify(
                 error, llm=self.llm, api_base=self.api_base, secrets=secrets, options=self.options

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
 
-from falsifier.core.experiment import common_part, exact
+from falsifier.core.experiment import MAX_STEPS, common_part, exact
 from falsifier.core.literals import digits
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import FreeSection
@@ -21,8 +21,6 @@ _DEFAULT_INTERVALS = 1000
 _MAX_INTERVALS = 100_000
 # Intervals with this many digits or more are no rounder than others.
 _MANY_DIGITS = 8
-# Maximum number of steps of each kind per simulation; trajectories have one sample per output interval.
-MAX_STEPS = 10_000_000
 # In s: the program that runs FMUs takes times for equal that are a tenth of this apart.
 _SHORTEST_STEP = 1e-10
 # An input that changes this often within the formula's smallest window can meet each of its conditions.

@@ -18,7 +18,7 @@ from falsifier.fmu import Rights, System, is_package, is_solved, read_info, read
 from falsifier.problem.grid import Grid, check_steps, choose_grid, default_freedom, formula_times
 from falsifier.problem.models import make_model
 from falsifier.problem.ranges import search_space, string_values, value_kind
-from falsifier.problem.requirement import Requirement, formula_of, section_formulas
+from falsifier.problem.requirement import Requirement, check_comparable, formula_of, section_formulas
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, Simulation
 from falsifier.problem.shorthand import searching, stated_as
 from falsifier.problem.source import STL_NAME
@@ -311,8 +311,8 @@ def _recording(
         if name not in info:
             names = [v.name for v in info.variables]
             raise SpecError(f"unknown variable {name!r}; {did_you_mean(name, names)}", key="model.record")
-        if info[name].kind == "string":
-            raise SpecError(f"{name!r} is a string; only numbers can be recorded", key="model.record")
+        with in_section(key="model.record"):
+            check_comparable(info[name])
         if name not in outputs and not (info[name].causality == "input" and name in known):
             outputs.append(name)
     internals = [name for name in internals if name not in (*omitted, *outputs)]

@@ -95,9 +95,9 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
 
 
 def check_comparable(variable: Variable) -> None:
-    """Check that formulas can compare what a variable is in a simulation; SpecError if not."""
+    """Check that a simulation gives a variable values that formulas can compare; SpecError if not."""
     if variable.kind == "string":
-        raise SpecError(f"{variable.name!r} is a string, and formulas compare numbers")
+        raise SpecError(f"{variable.name!r} is a string; only numbers can be recorded and compared")
     if variable.is_clocked:
         raise SpecError(
             f"{variable.name!r} changes only when a clock ticks, which is not simulated here; name a "

@@ -13,10 +13,11 @@ from falsifier.core.arguments import instance, texts
 from falsifier.core.literals import number_in, shortest
 from falsifier.core.model import Interface
 from falsifier.core.ranges import Scale
-from falsifier.errors import SpecError, first_fault, in_section, naming, setting, shown, written
+from falsifier.errors import SpecError, did_you_mean, first_fault, in_section, naming, setting, shown, written
 from falsifier.fmu import Rights, resolved
 from falsifier.problem.sections import InputSection, ModelChanges, ParameterSection, RequirementSection
 from falsifier.problem.spec import AnyRequirement, parse_spec
+from falsifier.problem.templates import TEMPLATES
 from falsifier.stl.lexer import RESERVED
 
 # Keys that the option of the same name states; --set and --search state inputs and parameters.
@@ -291,6 +292,10 @@ def requirement_of(text: str) -> AnyRequirement:
                 f"requirement ({setting('stop_time')}, ...), or write a spec with [requirements.NAME]",
                 key=beside[0],
             )
+        fields = TEMPLATES[named[1]].model_fields if named[1] in TEMPLATES else arguments
+        if unknown := next((key for key in arguments if key not in fields), None):
+            known = [name for name in fields if name not in (*ModelChanges.model_fields, "template")]
+            raise SpecError(f"unknown key; {did_you_mean(unknown, known)}", key=unknown)
     try:
         spec = parse_spec({"model": {"fmu": "-"}, "requirements": {"R": arguments}}, file=place)
     except SpecError as error:

@@ -27,7 +27,7 @@ from falsifier.problem.templates import TEMPLATES
 Section = TypeVar("Section", bound=BaseModel)
 Profiles = dict[str, sections.ProfileSection]
 # Names that we choose stand in messages, tables and titles.
-NAME_IN_LINES = "expected a name of one line without control characters"
+NAME_IN_LINES = "expected a name of one line without control characters and invisible ones"
 # Limits of a spec file: the time to read nested keys grows with the square of their depth.
 _MAX_LENGTH = 1_000_000
 _MAX_KEY_PARTS = 500

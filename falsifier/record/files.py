@@ -180,7 +180,7 @@ def check_unused(directory: Path) -> None:
         for path in directory.iterdir() if directory.exists() else ():
             full = next(path.iterdir(), None) if path.is_dir() else path.lstat().st_size
             if full and not path.match("*.json.*.partial"):  # of write_whole
-                other = f"choose another {written('--out', 'directory')}, new or empty"
+                other = f"choose another {written('--out', 'directory')}, new or empty, or delete them"
                 raise JournalError(f"{directory} has files, which are kept: {other}")
 
 

@@ -28,7 +28,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, remove_partial
 from falsifier.core.literals import one_line, shell_word
 from falsifier.core.words import counted
-from falsifier.errors import JournalError, written
+from falsifier.errors import JournalError, SpecError, written
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.record import files, manifest
 from falsifier.record.records import (
@@ -282,7 +282,7 @@ class JournalReader:
                     check_seal(line)
                     record = parse_line(line, number, self.run)
                     self._count(record)
-                except ValueError as error:
+                except (ValueError, SpecError) as error:
                     raise JournalError(
                         f"{self.path}: line {number} is damaged: {error}; to drop what is damaged: "
                         f"falsifier tools repair {shell_word(self.path.parent)}"
@@ -291,10 +291,13 @@ class JournalReader:
                 yield record
 
     def _count(self, record: Record) -> None:
-        """Count what a record is about; ValueError if what it follows from was not recorded before it."""
+        """Count what a record is about; ValueError if what it follows from was not recorded before it.
+
+        SpecError if a candidate is none.
+        """
         match record:
             case AskedRecord() if record.first == self._asked:
-                self._asked += len(record.candidates)
+                self._asked += len([*map(Candidate.from_json, record.candidates)])
             case EvaluatedRecord() if record.index == self._evaluated < self._asked:
                 self._evaluated += 1
             case ConfirmedRecord() if not 0 <= record.index < self._evaluated:

@@ -43,7 +43,7 @@ class Spent:
         simulation_seconds: time inside the simulator.
         engine_seconds: time inside the engine, including the language model.
         calls: requests to a language model that were answered or timed out.
-        without_reply: number of them that timed out, or whose answer cannot be read.
+        without_reply: number of them that timed out, were interrupted, or whose answer cannot be read.
         kept: replies of a language model that were taken from the cache, without a request.
         prompt_tokens: tokens sent.
         completion_tokens: tokens received, including reasoning.

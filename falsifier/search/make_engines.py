@@ -7,6 +7,7 @@ from pathlib import Path
 from falsifier.context.values import Context
 from falsifier.core import named
 from falsifier.core.files import cache_directory
+from falsifier.core.words import listed
 from falsifier.engines import DEFAULT_ENGINE, ENGINES, check_engine, make_engine
 from falsifier.engines.protocol import Engine
 from falsifier.errors import ChatSetupError, SpecError, setting
@@ -144,16 +145,17 @@ def note_llm(llm: LLMSettings | None) -> None:
         named.note(llm.check)
 
 
-def check_llm(place: Path, llm: LLMSettings | None) -> None:
-    """Refuse to ask a server that only a record names, which may be somebody else's.
+def check_llm(place: Path, *llms: LLMSettings | None) -> None:
+    """Refuse to ask servers that only a record names, which may be somebody else's.
 
     Raises:
-        ChatSetupError: naming it and what to do.
+        ChatSetupError: naming all of them and what to do.
     """
-    if not (llm is None or llm.is_usual or named.is_noted(llm.check)):
+    others = {llm.check: llm.told for llm in llms if not (llm is None or llm.is_usual)}
+    if unnoted := {check: told for check, told in others.items() if not named.is_noted(check)}:
         raise ChatSetupError(
-            f"{place}: prompts, and a key of yours if the provider needs one, would go to {llm.told}, which "
-            f"{named.unnamed(llm.check)}"
+            f"{place}: prompts, and a key of yours if the provider needs one, would go to "
+            f"{listed([*unnoted.values()])}, which {named.unnamed(' && '.join(unnoted))}"
         )
 
 

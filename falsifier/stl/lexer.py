@@ -90,7 +90,8 @@ _MISPLACED = {
     "|": "write absolute values as abs(x)", "//": _COMMENT,
 }  # fmt: skip
 # The same where a symbol does not fit the one before it.
-_SPLIT = {"<>": "unequal is !=", "//": _COMMENT, "==>": "implication is ->", "-->": "implication is ->"}
+ARROWS = {"==>": "implication is ->, equivalence <->", "-->": "implication is ->, equivalence <->"}
+_SPLIT = {"<>": "unequal is !=", "//": _COMMENT, **ARROWS}
 JOIN = (
     "join two formulas with and, or, ->; numbers and signals with + - * /; write numbers without units, and "
     "names with blanks in double quotes"
@@ -164,7 +165,11 @@ def hint_at(tokens: Sequence[Token], index: int) -> str:
     pair = "".join(t.text for t in tokens[index : index + 2])
     if found := _MISPLACED.get(pair) or _MISPLACED.get(token.written):
         return found
-    if previous and (found := _SPLIT.get(previous.written + token.written)):
+    if (
+        previous
+        and previous.end == token.position
+        and (found := _SPLIT.get(previous.written + token.written))
+    ):
         return found
     if previous and previous.text in ("and", "or") and token.text in _COMPARING:
         return "repeat what is compared: x >= 0 and x <= 3"

@@ -305,6 +305,7 @@ class _Parser:
         hint = "comparisons and arithmetic need numbers and signals; join formulas with and, or, ->, <->"
         if isinstance(node, stl.Constant):
             hint = "write a Boolean signal b as b or not b"
+        hint = next((cure for arrow, cure in lexer.ARROWS.items() if arrow in self.text), hint)
         self._fail("expected a number or a signal, got a formula", start, hint)
 
     def _fail_depth(self, position: int) -> NoReturn:

@@ -70,6 +70,12 @@ def test_init_writes_a_spec_that_runs_once_its_requirement_is_filled_in(tmp_path
     assert falsifier("run", "car.toml", "--engine", "uniform", "--budget", "2", cwd=tmp_path).code == 0
 
 
+def test_init_writes_where_a_link_leads(tmp_path: Path) -> None:
+    (tmp_path / "link.toml").symlink_to("spec.toml")
+    falsifier("init", "AT", "--out", "link.toml", cwd=tmp_path, code=0)
+    assert (tmp_path / "link.toml").is_symlink() and (tmp_path / "spec.toml").is_file()
+
+
 def test_nothing_is_written_for_an_fmu_that_cannot_be_simulated(tmp_path: Path) -> None:
     shutil.copy(ROOT / "tests" / "fixtures" / "fmus" / "Scheduled_3.fmu", tmp_path)
     done = falsifier("init", "Scheduled_3.fmu", cwd=tmp_path, code=3)

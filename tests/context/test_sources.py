@@ -92,6 +92,8 @@ CONSTANTS = {
     "cast": "((real_T)7.2F)",
     "low": "((float)-7.2)",
     "less": "(c)-7",
+    "wide": "(unsigned int)3",
+    "pair": "3 4",
 }
 
 
@@ -109,6 +111,12 @@ CONSTANTS = {
         ("u > cast", (7.2,)),
         ("u < low", (-7.2,)),
         ("u < less", ()),
+        ("u < wide", (3.0,)),
+        ("u > (long long)- 3", ()),
+        ("u > (const unsigned long) 3", (3.0,)),
+        ("u > (signed char)-3", (-3.0,)),
+        ("u > - 3", (-3.0,)),
+        ("u < pair", ()),
         ("u > ( my_real ) .5", (0.5,)),
         ("if (on) u > 3", (3.0,)),
         ("u > (float)v + 3", ()),

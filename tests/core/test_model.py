@@ -93,6 +93,8 @@ def test_what_goes_wrong_is_a_failed_simulation(
         ({"output_interval": -0.1}, "output_interval: expected a positive number"),
         ({"output_interval": 0.3}, "not an integer multiple of output_interval = 0.3 s; try .* = 0.2$"),
         ({"output_interval": 2.0}, "not an integer multiple of output_interval = 2 s; try .* 1$"),
+        ({"stop_time": 1e308, "output_interval": 1e-10}, "^output_interval: .* smallest value is 1e[+]301"),
+        ({"step_size": 1e-320}, "^step_size: output_interval = 0.1 s has more than 10,000,000 times"),
         ({"step_size": 0.0}, "step_size: expected a positive number"),
         ({"step_size": 0.03}, "^step_size: .* try step_size = 0.02"),
         ({"step_size": 0.2}, "^step_size: .* try step_size = 0.1"),

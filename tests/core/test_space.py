@@ -47,8 +47,10 @@ def test_unknown_and_missing_names_are_named() -> None:
         SPACE.admit(Candidate({"throtle": good.signals["throttle"]}, {}))
     with pytest.raises(CandidateError, match="'brake' is missing"):
         SPACE.admit(Candidate({"throttle": good.signals["throttle"]}, {"roll": 0.7}))
-    with pytest.raises(CandidateError, match="expected 11 numbers, got 2"):
+    with pytest.raises(CandidateError, match="expected 11 finite numbers, got 2"):
         SPACE.decode([1.0, 2.0])
+    with pytest.raises(CandidateError, match="expected 11 finite numbers, got nan"):
+        SPACE.decode([math.nan] * 11)
 
 
 def test_a_free_parameterization_is_checked_against_its_limits() -> None:

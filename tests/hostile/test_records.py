@@ -88,6 +88,9 @@ def test_the_command_that_the_refusal_states_names_a_module(theirs: Path) -> Non
 def test_the_command_that_the_refusal_states_names_a_server(tmp_path: Path) -> None:
     with serving() as server:  # its script has no answers, so the check itself fails
         theirs = LLMSettings(name="openai/x", api_base=server.url, options={"user": "a b", "store": True})
+        other = LLMSettings(name="openai/y", api_base=server.url)
+        with pytest.raises(ChatSetupError, match=r"openai/x at .* and openai/y at .* && falsifier llm check"):
+            check_llm(tmp_path, theirs, other, other)
         with pytest.raises(ChatSetupError) as refused:
             check_llm(tmp_path, theirs)
         command = shlex.split(str(refused.value).rpartition("name it first: falsifier ")[2])

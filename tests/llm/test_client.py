@@ -6,11 +6,13 @@ import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 import falsifier
 from falsifier.errors import ChatError
+from falsifier.llm import client
 from falsifier.llm.client import LiteLLMChat
 from falsifier.llm.failures import FormatUnsupportedError, TransientChatError
 from falsifier.llm.json_text import schema_of_object
@@ -274,6 +276,13 @@ def test_a_request_without_an_answer_in_time_is_counted(model: str) -> None:
     assert caught.value.lost is not None
     assert caught.value.lost.without_reply == 1 and caught.value.lost.prompt_tokens > 0
     assert len(server.received) == 2
+
+
+def test_a_request_that_is_interrupted_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(client, "within", Mock(side_effect=KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        LiteLLMChat("openai/mine", api_base="http://127.0.0.1:9").complete(REQUEST)
+    assert getattr(stopped.value, "lost", Usage()).without_reply == 1
 
 
 _QUIET = """

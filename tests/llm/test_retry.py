@@ -95,15 +95,20 @@ def test_requests_that_timed_out_are_counted_as_paid() -> None:
         assert len(server.requests) == 2
 
 
-@pytest.mark.parametrize("ending", [KeyboardInterrupt(), ChatError("no such model")], ids=repr)
+IN_VAIN = ChatError("not readable")
+IN_VAIN.lost = Usage(prompt_tokens=9, cost=0.25, estimated=True, without_reply=1)
+
+
+@pytest.mark.parametrize("ending", [KeyboardInterrupt(), ChatError("no such model"), IN_VAIN], ids=repr)
 def test_requests_that_timed_out_are_counted_however_the_wait_for_a_reply_ends(ending: BaseException) -> None:
     late = TransientChatError("late")
     late.lost = Usage(prompt_tokens=50, cost=0.5, estimated=True, without_reply=1)
     failures = iter([late, ending])
+    own = getattr(ending, "lost", None) or Usage(cost=0.0)
 
     def fail(_: ChatRequest) -> str:
         raise next(failures)
 
     with pytest.raises(type(ending)) as ended:
         asked(ScriptedChat(fail))
-    assert getattr(ended.value, "lost", None) == late.lost
+    assert getattr(ended.value, "lost", None) == late.lost + own

@@ -347,6 +347,10 @@ def test_what_belongs_to_a_clock_that_never_ticks_cannot_be_required() -> None:
     problem = Problem.from_fmu(fixture("ClocksAndBinary_3"), "G (y <= 1)")
     with pytest.raises(SpecError, match="stl: 'sampled' changes only when a clock ticks"):
         problem.with_requirement("G (sampled > 1)")
+    model = {"fmu": str(fixture("ClocksAndBinary_3")), "record": ["sampled"]}
+    stated = {"inputs": {"u": {"range": [0, 1]}}, "requirements": {"R": {"formula": "G (y <= 1)"}}}
+    with pytest.raises(SpecError, match=r"model\.record: 'sampled' changes only when a clock ticks"):
+        join(parse_spec({"model": model} | stated, file="my.toml"), "R", path=FILE)
 
 
 def test_too_short_a_stop_time_is_not_blamed_on_the_interval() -> None:
@@ -357,7 +361,7 @@ def test_too_short_a_stop_time_is_not_blamed_on_the_interval() -> None:
 def test_strings_are_no_numbers() -> None:
     variables = Variable("out", "string", "output"), Variable("in", "string", "input"), Variable("x")
     info = ModelInfo("m", variables=variables)
-    with pytest.raises(SpecError, match="'out' is a string, and formulas compare numbers"):
+    with pytest.raises(SpecError, match="'out' is a string; only numbers can be recorded and compared"):
         parse_requirement("G (out > 1)", info, Experiment(1.0, 0.1, ()))
     for stated in ({"value": 1}, {"range": [0, 1]}):
         section = {"in": InputSection.model_validate(stated)}

@@ -138,6 +138,8 @@ def test_what_does_not_fit_the_simulation_is_an_error(template: str, message: st
         ("rise signal=x reference=y direction=down time=1", "state reaches as well: '110%' of 20 is 22"),
         ("rise signal=x reference=-80 time=1", "a negative reference.* '90%' of it -72"),
         ("rise signal=x reference=1 time=1 tim=1", r"stl: tim: unknown key; did you mean 't"),
+        ("never_together inputs=1 x=1", r"stl: inputs: it changes simulations"),
+        ("never_together x=1", "stl: x: unknown key; known: description, during, conditions$"),
         ("stays_within signal=x", "expected low, high or both"),
         ("stays_within signal=x low=2 high=1", "low is 2, more than high, 1"),
         ("stays_within signal=x low=1 reference=2 within=1", "expected low, high or both"),

@@ -75,10 +75,17 @@ def test_a_journal_whose_records_do_not_follow_each_other_is_damaged(
 
 
 def test_what_is_wrong_with_a_value_of_a_record_is_said_with_its_key(tmp_path: Path) -> None:
-    content = asked(0, 1).model_dump(exclude={"sum"}) | {"line": 1, "seconds": "x"}
-    (tmp_path / "journal.jsonl").write_text(seal(json.dumps(content)))
-    with pytest.raises(JournalError, match=r"line 1 is damaged: asked\.seconds: expected a number, got 'x'"):
-        journal.read_journal(tmp_path)
+    for wrong, said in (
+        ({"seconds": "x"}, r"asked\.seconds: expected a number, got 'x'"),
+        (
+            {"candidates": [{"signals": {"u": {"times": [0]}}}]},
+            r"signals\.u: expected times, values and inter",
+        ),
+    ):
+        content = asked(0, 1).model_dump(exclude={"sum"}) | {"line": 1} | wrong
+        (tmp_path / "journal.jsonl").write_text(seal(json.dumps(content)))
+        with pytest.raises(JournalError, match=rf"journal\.jsonl: line 1 is damaged: {said}"):
+            journal.read_journal(tmp_path)
 
 
 def test_one_writer_per_directory(tmp_path: Path) -> None:

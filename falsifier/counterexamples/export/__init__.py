@@ -50,7 +50,7 @@ def export_counterexample(
     columns = tables.file_columns(table, problem.model)
     scripts = {
         "replay.py": replay_script(problem, evaluation, columns),
-        "replay.mos": openmodelica_script(problem, start),
+        "replay.mos": openmodelica_script(problem, start, has_inputs=bool(columns)),
     }
     for name, text in scripts.items():
         if text is not None:

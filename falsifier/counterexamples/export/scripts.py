@@ -127,13 +127,15 @@ def _mark_of(verdict: Verdict) -> str:
     return f"  <- {'violated' if verdict.breach else 'decided by'}: {one_line(part)}"
 
 
-def openmodelica_script(problem: Problem, start: Mapping[str, float | str]) -> str | None:
-    """OpenModelica script; None if the model is not an FMU."""
+def openmodelica_script(
+    problem: Problem, start: Mapping[str, float | str], *, has_inputs: bool
+) -> str | None:
+    """OpenModelica script, for an input.csv if there are inputs in it; None if the model is not an FMU."""
     if not isinstance(problem.model, FmuModel):
         return None
     info = problem.info
     overrides = ",".join(f"{name}={text_of(value, info[name].kind)}" for name, value in start.items())
-    flags = ["-csvInput=input.csv"] if any(v.kind != "string" for v in problem.info.inputs) else []
+    flags = ["-csvInput=input.csv"] if has_inputs else []
     flags += [f"-override={overrides}"] if overrides else []
     name = problem.info.name
     return _template("openmodelica.template").format(

@@ -67,7 +67,7 @@ def file_hash(path: Path) -> str:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise ModelError(
-            f"{path}: cannot read the FMU ({error.strerror or error}); give the path of an .fmu file"
+            f"{path}: cannot be read ({error.strerror or error}); give the path of an FMU or SSP package"
         ) from error
 
 
@@ -117,7 +117,7 @@ def read_entry(path: Path, name: str, first: int | None = None) -> bytes:
                 f"{path}: the archive contains no {name}, so it is not an FMU; export the model again"
             ) from None
         except UNREADABLE as error:
-            raise _damaged(f"{path}: {name} is damaged", error, "; copy or export the FMU again") from error
+            raise _damaged(f"{path}: {name} is damaged", error) from error
 
 
 def extract(path: Path, folder: Path) -> None:
@@ -137,10 +137,11 @@ def extract(path: Path, folder: Path) -> None:
             raise _damaged(f"{path}: cannot be unpacked into {folder}", error) from error
 
 
-def _damaged(what: str, error: Exception, remedy: str = "") -> ModelError:
+def _damaged(what: str, error: Exception) -> ModelError:
     """Return the error of a file that is no archive, or a damaged one, or that the system does not read."""
-    kind = ModelError if isinstance(error, OSError) and error.errno is not None else ModelFileError
-    return kind(f"{what} ({error}){remedy}")
+    if isinstance(error, OSError) and error.errno is not None:
+        return ModelError(f"{what} ({error})")
+    return ModelFileError(f"{what} ({error}); copy the file again, or have its tool write it again")
 
 
 def entry_names(path: Path) -> tuple[str, ...]:

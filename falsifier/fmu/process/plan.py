@@ -128,7 +128,7 @@ def given_values(
         if not (low - 0.5 <= values.min() and values.max() <= high + 0.5):
             raise SimulationError(
                 f"{plan.model}: values from {values.min():.10g} to {values.max():.10g} do not fit {name!r}, "
-                f"whose type ranges from {low} to {high}",
+                f"whose type ranges from {low:.16g} to {high:.16g}",
                 time=0.0,
             )
     return given

@@ -256,7 +256,7 @@ def imported(script: Path) -> set[str]:
 def test_the_openmodelica_script_has_the_experiment_the_inputs_and_the_start_values() -> None:
     problem = load_problem("AT1")
     problem = replace(problem, experiment=replace(problem.experiment, tolerance=1e-9))
-    script = openmodelica_script(problem, {"finalDrive": 3.25})
+    script = openmodelica_script(problem, {"finalDrive": 3.25}, has_inputs=True)
     assert script is not None
     for part in (
         'loadFile("ArchComp/package.mo")',
@@ -265,7 +265,7 @@ def test_the_openmodelica_script_has_the_experiment_the_inputs_and_the_start_val
         "AT1: G[0,20] (speed <= 120)",
     ):
         assert part in script
-    without = openmodelica_script(load_problem("F16"), {})
+    without = openmodelica_script(load_problem("AT1"), {}, has_inputs=False)
     assert without is not None and 'simflags=""' in without and "tolerance" not in without
 
 

@@ -97,7 +97,7 @@ def test_what_is_not_an_fmu_is_named(tmp_path: Path) -> None:
     (tmp_path / "text.fmu").write_text("hello")
     with pytest.raises(ModelError, match=r"text\.fmu: not a readable FMU"):
         read_info(tmp_path / "text.fmu")
-    with pytest.raises(ModelError, match=r"none\.fmu: cannot read"):
+    with pytest.raises(ModelError, match=r"none\.fmu: cannot be read"):
         read_info(tmp_path / "none.fmu")
     with pytest.raises(ModelError, match=r"no modelDescription\.xml"):
         read_info(write(tmp_path / "zip.fmu", ("a.txt", b"x")))

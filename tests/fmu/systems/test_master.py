@@ -150,6 +150,8 @@ def test_values_that_do_not_fit_their_type_are_refused_with_the_component() -> N
         SimulationError, match=r"^system: values from 0 to 300 do not fit 'a.in_Int8', .* -128 to 127"
     ):
         run(model, "a.out_Int8", signals={"a.in_Int8": Signal((0.0, 1.0), (0.0, 300.0), "linear")})
+    with pytest.raises(SimulationError, match=r"values from 1e\+39 to 1e\+39 do not fit 'a.in_Float32'"):
+        run(model, "a.out_Float32", signals={"a.in_Float32": Signal((0.0,), (1e39,))})
 
 
 @pytest.mark.parametrize(

@@ -34,7 +34,7 @@ def test_what_is_not_a_system_is_refused() -> None:
         System({})
     with pytest.raises(SpecError, match=r"coupling\.method: expected gauss-seidel or jacobi"):
         loop(Coupling("both"))  # type: ignore[arg-type]
-    with pytest.raises(ModelError, match=r"nowhere\.fmu: cannot read the FMU"):
+    with pytest.raises(ModelError, match=r"nowhere\.fmu: cannot be read"):
         System({"a": "nowhere.fmu"})
 
 
