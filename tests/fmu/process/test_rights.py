@@ -72,6 +72,7 @@ def test_one_line_says_what_is_allowed_and_what_is_not_enforced() -> None:
 
 GIVEN = {
     "PATH": "/bin",
+    "PYTHONPATH": "/packages",
     "LC_ALL": "de_DE.UTF-8",
     "LM_LICENSE_FILE": "27000@server",
     "OPENAI_API_KEY": "a key",
@@ -83,7 +84,7 @@ GIVEN = {
 
 def test_fmus_see_what_libraries_need_and_nothing_else() -> None:
     seen = worker_environment(GIVEN, Path("/work"))
-    kept = ("PATH", "LC_ALL", "LM_LICENSE_FILE")
+    kept = ("PATH", "PYTHONPATH", "LC_ALL", "LM_LICENSE_FILE")
     assert {name: seen.pop(name) for name in kept} == {name: GIVEN[name] for name in kept}
     assert seen.pop("OMP_NUM_THREADS") == "1"
     assert {seen.pop(name) for name in ("TMPDIR", "TEMP", "TMP")} == {"/work"}
