@@ -284,6 +284,8 @@ def test_a_failure_tells_what_was_refused_before(place: Place) -> None:
     said = place.run(CHANGE, 100 + OVERWRITE)
     assert said.startswith("SimulationError failed")
     assert str(place.home / "victim") in said and f"allow=['write:{place.home}']" in said
+    said = place.run(CHANGE, 100 + CREATE, at=Path("/dev/shm"))
+    assert "allow=['write:/dev/shm']" in said, "shared memory and semaphores, which are no devices"
     said = place.run(EXECUTE, 100)
     assert "/bin/sh" in said and "allow=['programs']" in said
     assert "refused" not in place.run(CRASH)

@@ -170,7 +170,8 @@ def read_told(data: bytes) -> Told:
             case b"e":
                 enforced = ord(part[1:2] or b"0") - ord("0")
             case b"w":
-                advice = _advice(f"write:{Path(path).parent}")
+                is_folder = os.path.isdir(path)  # noqa: PTH112 (Path.is_dir fails where nothing may be read)
+                advice = _advice(f"write:{path if is_folder else Path(path).parent}")
                 refused.append(f"tried to change {path}, which was refused; {advice}")
             case b"x":
                 refused.append(f"tried to execute {path}, which was refused; {_advice(_PROGRAMS_WORD)}")
@@ -179,7 +180,7 @@ def read_told(data: bytes) -> Told:
             case b"p":
                 refused.append("tried to change the settings of another process, which was refused")
             case b"f":
-                refused.append("tried to start more processes than it may")
+                refused.append("tried to start more than 256 processes or 8192 threads")
     shown = first_few(refused, _SHOWN_REFUSALS, between="; it ")
     return Told("; ".join(causes), f"the FMU {shown}" if shown else "", enforced)
 

@@ -38,7 +38,7 @@ MORE = "FALSIFIER_FMU_VARIABLES"
 
 # Where programs and libraries are, who the user is, language and time zone, and licences.
 _PASSED = re.compile(
-    r"PATH|HOME|USER|LOGNAME|LANG|LANGUAGE|LC_\w+|TZ|LD_LIBRARY_PATH|DYLD_(FALLBACK_)?LIBRARY_PATH"
+    r"(PYTHON)?PATH|HOME|USER|LOGNAME|LANG|LANGUAGE|LC_\w+|TZ|LD_LIBRARY_PATH|DYLD_(FALLBACK_)?LIBRARY_PATH"
     r"|\w*LICEN[SC]E\w*",
     re.IGNORECASE,
 )

@@ -46,6 +46,9 @@ def test_what_was_refused_is_told_with_the_way_out() -> None:
     for said in ("allow=['write:/etc']", "/bin/sh", "allow=['programs']", "signal"):
         assert said in told.refusals
     assert "allow=['write:/my logs']" in read_told(b"w/my logs/x\0").refusals
+    # A file without a name in a folder that exists: advice for what is above would allow too much.
+    assert "allow=['write:/usr']" in read_told(b"w/usr\0").refusals
+    assert "threads" in read_told(b"f\0").refusals
     assert "\x1b" not in read_told(b"w/\x1b[2J\xff\0").refusals
     assert read_told(b"r/bin/true\0").cause.endswith("/bin/true")
     assert read_told(b"") == read_told(b"?unknown\0")
@@ -69,6 +72,7 @@ def test_one_line_says_what_is_allowed_and_what_is_not_enforced() -> None:
 
 GIVEN = {
     "PATH": "/bin",
+    "PYTHONPATH": "/packages",
     "LC_ALL": "de_DE.UTF-8",
     "LM_LICENSE_FILE": "27000@server",
     "OPENAI_API_KEY": "a key",
@@ -80,7 +84,7 @@ GIVEN = {
 
 def test_fmus_see_what_libraries_need_and_nothing_else() -> None:
     seen = worker_environment(GIVEN, Path("/work"))
-    kept = ("PATH", "LC_ALL", "LM_LICENSE_FILE")
+    kept = ("PATH", "PYTHONPATH", "LC_ALL", "LM_LICENSE_FILE")
     assert {name: seen.pop(name) for name in kept} == {name: GIVEN[name] for name in kept}
     assert seen.pop("OMP_NUM_THREADS") == "1"
     assert {seen.pop(name) for name in ("TMPDIR", "TEMP", "TMP")} == {"/work"}

@@ -198,9 +198,12 @@ def test_a_refused_first_step_tells_its_size() -> None:
     slow = replace(MODEL.network, members=tuple(replace(m, step=0.5) for m in MODEL.network.members))
     told = failure(slow, PLAN, Reply(Where.STEPPING, 3, time=0.0, component=0), "", ())
     assert re.search(r"the first step, of 0.5 s, .* needs it as components\.\w+\.step", str(told))
-    for line, is_about_steps in {"Step of 1 s, not 2": True, "ValueError: a": False, "ok: set": True}.items():
-        said = str(failure(MODEL.network, PLAN, Reply(Where.STEPPING, 3, time=0.0, component=0), "", (line,)))
-        assert ("needs it as step_size" in said) is is_about_steps and said.endswith(f"message: {line}")
+    about = {"Step of 1 s, not 2": True, "ValueError: a": False, "ok: set": True, "doStep failed": True}
+    about["[doStep]\nValueError: a"] = False
+    for text, is_about_steps in about.items():
+        lines = tuple(text.split("\n"))
+        said = str(failure(MODEL.network, PLAN, Reply(Where.STEPPING, 3, time=0.0, component=0), "", lines))
+        assert ("needs it as step_size" in said) is is_about_steps and said.endswith(lines[-1])
     later = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 3, time=0.5, component=0), "", ())
     assert "the step returned error at t = 0.5 s" in str(later)
     pending = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 5, time=0.0, component=0), "", ())

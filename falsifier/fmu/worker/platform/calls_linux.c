@@ -346,7 +346,8 @@ static int resolve(char *path, int follow)
 static int is_refused(char *path, const struct policy *policy, int follow)
 {
     char folder[PATH_MAX];
-    if (!strncmp(path, "/proc/", 6) || !strncmp(path, "/dev/", 5) || !resolve(path, follow))
+    const int is_device = !strncmp(path, "/dev/", 5) && strncmp(path, "/dev/shm/", 9); /* shared memory is none */
+    if (!strncmp(path, "/proc/", 6) || is_device || !resolve(path, follow))
         return 0;
     if (is_beneath(path, policy->writable))
         return 0;
