@@ -39,7 +39,7 @@ COMPARED = (*SYSTEMS, "AT51", "AT6a", "AFC27", "PulseMeter", "HeaterLimpHome", "
 SAMPLES = (0, 1, 5, 20)
 Array = NDArray[np.float64]
 _REGULAR = re.compile(r"by (\S+) every (\S+) s to (\S+)")
-_OSCILLATION = re.compile(r"oscillates from (\S+) to (\S+) s with period .*?, between (.*?) and (.*)")
+_OSCILLATION = re.compile(r"swings from (\S+) to (\S+) s.*?, between (.*?) and (.*)")
 _WITHIN = re.compile(r" \(each value within (\S+); least \S+ at \S+ s, greatest \S+ at \S+ s\)$")
 
 

@@ -2,7 +2,7 @@
 
 from falsifier.core.space import SearchSpace
 
-_FIRST = "If names and descriptions suggest how a violation comes about, begin with that; otherwise, {}."
+_FIRST = "If names or descriptions suggest how a violation comes about, begin with that; otherwise, {}."
 _FIRST_OF = {
     "parameters": "the limits of the ranges are good first samples",
     "jumping": (
@@ -13,14 +13,14 @@ _FIRST_OF = {
         "through a whole range, which show how and where the system reacts"
     ),
 }
-_ON_OUTPUTS = "Use the output values of the earlier samples to work out how each {one} affects the outputs."
 _ON_TIME = (
     "Look at the times that decided the robustness values, or at which a violation was nearest, and change "
     "the {what} so that the signals at such a time move towards violating the requirement."
 )
 _ON_STRATEGY = (
     "As long as samples improve, go on from the best ones, or between two of them. If they stop improving, "
-    "do not just repeat the best one with small changes, but try a different strategy{such}."
+    "do not just repeat the best one with small changes, unless it was very close to a violation, but "
+    "try a different strategy{such}."
 )
 _ON_PLATEAU = "Do not just repeat a sample with small changes, but try a different strategy{such}."
 _SUCH = (
@@ -44,7 +44,7 @@ def on_next(space: SearchSpace, *, is_timed: bool, is_flat: bool) -> str:
     what = "inputs" if space.inputs else "parameters"
     on_time = [_ON_TIME.format(what=what)] if is_timed else []
     on_strategy = (_ON_PLATEAU if is_flat else _ON_STRATEGY).format(such="" if _only_jumps(space) else _SUCH)
-    return "\n".join((_ON_OUTPUTS.format(one=what[:-1]), *on_time, on_strategy))
+    return "\n".join((*on_time, on_strategy))
 
 
 def _only_jumps(space: SearchSpace) -> bool:

@@ -35,14 +35,14 @@ _MOST_SWINGS = 3
 _RIPPLE_SHARE = 0.02
 # or than these multiples of what is allowed, where that is less.
 _OF_RIPPLE = 1.5
-# Share of its span within which a course must be told to be told at all.
-_TOO_COARSE = 0.3
 # Fewer turning points are a transient, not an oscillation.
 _MIN_TURNS = 6
 # Above every distance in multiples of what is allowed, which is no less than a thousandth of a span.
 _URGENT = 1e6
 # A period that changes by more than this factor is told at the beginning and at the end.
 _PERIOD_FACTOR = 1.5
+# Share of periods that differ from the one before by more than that, up to which a swing is regular.
+_UNEVEN = 0.25
 
 Label = Callable[[float, str], str]
 
@@ -87,19 +87,19 @@ def _changes(begun: Sequence[tuple[float, float]], clock: int, label: Label) -> 
 
 
 def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda _, text: text) -> str:
-    """How often each value was entered, and its shortest stay, of those entered twice at least; or empty.
+    """The shortest stay at each value at which the signal stayed more than once; or empty.
 
-    The first interval does not count as entered, and the last one is cut off by the end of the times.
+    The last stay is cut off by the end of the times.
     """
     found = _pieces(times, column)
     words = []
     for value in sorted({value for value, _, _ in found}):
-        entered = [(start, end) for v, start, end in found[1:] if v == value]
-        if len(entered) > 1:
-            complete = entered[:-1] if found[-1][0] == value else entered
-            start, end = min(complete, key=lambda stay: stay[1] - stay[0])
-            stay = f"shortest stay {plain(end - start, 3)} s from {plain(start, clock)} s"
-            words.append(f"{label(value, plain(value, 6))}: entered {len(entered)} times, {stay}")
+        stays = [(end - start, start) for v, start, end in found[:-1] if v == value]
+        count = len(stays) + (found[-1][0] == value)
+        if count > 1:
+            length, start = min(stays)
+            stay = f"the shortest {plain(length, 3)} s from {plain(start, clock)} s"
+            words.append(f"{count} at {label(value, plain(value, 6))}, {stay}")
     return "; ".join(words)
 
 
@@ -129,6 +129,7 @@ class Swing(NamedTuple):
     start: float
     end: float
     periods: tuple[float, float]  # in s, at the beginning and at the end
+    is_regular: bool  # whether most periods are about as long as the one before
     lower: Points
     upper: Points
 
@@ -144,8 +145,9 @@ class Swing(NamedTuple):
         changes = max(first, last) > _PERIOD_FACTOR * min(first, last)
         begin, end = (plain(p, decimals_for(p, 2)) for p in self.periods)
         period = f"{begin} s, at the end {end} s" if changes else f"{begin} s"
+        how = f" with period {period}" if self.is_regular else ", not regularly"
         return (
-            f"oscillates from {plain(self.start, clock)} to {plain(self.end, clock)} s with period {period}, "
+            f"swings from {plain(self.start, clock)} to {plain(self.end, clock)} s{how}, "
             f"between {_pairs(self.lower, clock)} and {_pairs(self.upper, clock)}"
         )
 
@@ -160,13 +162,15 @@ def course(
     claimed: float | None = None,
     kept: Iterable[float] = (),
     most: int = MOST_BREAKPOINTS,
+    coarsest: float = 1.0,
 ) -> str:
     """Return breakpoints as ``time:value``, joined by straight lines, and envelopes and periods between them.
 
     ``clock`` is the number of decimals of times, ``tolerance`` the distance from the signal that is wanted,
     in its own unit, one number or one per time. Oscillations with at least the period ``slower_than`` are
     told point by point, if points suffice. What is less exact than ``claimed``, by default the largest
-    distance that is wanted, says so. ``most`` limits the breakpoints beside those at the times ``kept``.
+    distance that is wanted, says so; beyond the share ``coarsest`` of the span, only extremes are told.
+    ``most`` limits the breakpoints beside those at the times ``kept``.
     """
     allowed = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), times.shape)
     kept, claimed = tuple(kept), float(allowed.max()) if claimed is None else claimed
@@ -216,7 +220,7 @@ def course(
         f"{word} {number(column[k], resolving(column[k], off / 100, 5))} at {plain(times[k], clock)} s"
         for word, k in ends
     )
-    if off > _TOO_COARSE * float(np.ptp(column)):
+    if off > coarsest * float(np.ptp(column)):
         return f"{extremes}, and too irregular in between to be told"
     return f"{text} ({within}; {extremes})"
 
@@ -293,10 +297,12 @@ def _swing(times: Array, column: Array, turns: list[int], allowed: Array) -> Swi
     low = [k for k, up in zip(turns[1:], rising, strict=True) if not up]
     (low if rising[0] else high).insert(0, turns[0])
     periods = times[turns[2:]] - times[turns[:-2]]  # rises and falls may differ
+    uneven = np.abs(np.diff(np.log(periods))) > np.log(_PERIOD_FACTOR)
     return Swing(
         float(times[turns[0]]),
         float(times[turns[-1]]),
         (float(np.median(periods[:_MIN_TURNS])), float(np.median(periods[-_MIN_TURNS:]))),
+        bool(uneven.mean() <= _UNEVEN),
         _envelope(times, column, low, allowed),
         _envelope(times, column, high, allowed),
     )

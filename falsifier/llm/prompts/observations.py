@@ -1,9 +1,10 @@
 """Everything observed in one sample: what broke or decided it, parts of the formula, signals over time."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,11 @@ from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts import courses
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import coarse_clock, column_decimals, decimals_for, number, plain
-from falsifier.llm.prompts.together import longest_failure, near_misses
+from falsifier.llm.prompts.together import Side, asked_for, longest_failure, near_misses
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Verdict
 from falsifier.stl.diagnosis import links
+from falsifier.stl.expression import Call, Expression
 from falsifier.stl.formula import And, Iff, Implies, Or
 from falsifier.stl.margins import shown, signed
 
@@ -26,6 +28,8 @@ ROBUSTNESS_DIGITS = 5
 # Distance from a signal that its course may have, as a share of its span: of those compared, of others.
 TOLERANCE = 0.02
 TOLERANCE_OF_OTHERS = 0.04
+# Share of its span within which a course must be told to be told at all.
+_COARSEST, _COARSEST_OF_OTHERS = 0.3, 0.15
 # What is compared is told more exactly near its threshold: as a share of the distance to it, but no more
 # exactly than a share of the span.
 _OF_DISTANCE = 1 / 3
@@ -116,9 +120,10 @@ def _reasons(verdict: Verdict, diagnosis: Diagnosis, *, is_timed: bool) -> Itera
         if is_decider and not broke.never and len(breach.shortfalls) == 1 and not diagnosis.vacuities:
             return
     *above, decider = (step.text for step in diagnosis.path if step.text)
-    decided = "; ".join(above) + ": " * bool(above) + _MARGIN.sub("", decider)
-    always = [] if is_timed else ["That comparison was the same at all times."]
-    yield " ".join((f"why: {decided}.", *always, *(v.text for v in diagnosis.vacuities)))
+    path = "; ".join(above) + ": " * bool(above)
+    decider = _MARGIN.sub("", decider)
+    decided = f"{path}{decider}" if is_timed else f"{decider} at all times"
+    yield " ".join((f"why: {decided}.", *(v.text for v in diagnosis.vacuities)))
 
 
 def _discrete(view: View, inside: Trajectory) -> Iterator[str]:
@@ -143,8 +148,9 @@ def _continuous(
     for name, column in columns.items():
         if (of is not None and name not in of) or view.is_discrete(name, column):
             continue
-        most = courses.MOST_BREAKPOINTS if of is None and name in compared else _FEWER_BREAKPOINTS
-        yield f"{name}: {_drawn(view, name, inside, column, steps if name in compared else (), most)}"
+        is_judged = _is_judged(view, name)
+        most = courses.MOST_BREAKPOINTS if of is None and is_judged else _FEWER_BREAKPOINTS
+        yield f"{name}: {_drawn(view, name, inside, column, steps if is_judged else (), most)}"
 
 
 def _values_at(view: View, trajectory: Trajectory, time: float, robustness: float) -> str:
@@ -162,9 +168,18 @@ def _values_at(view: View, trajectory: Trajectory, time: float, robustness: floa
 
 def _nearest(view: View, trajectory: Trajectory, over_time: Mapping[Formula, Array]) -> Iterator[str]:
     """How close the others came to what is needed while some did what must happen together."""
-    for met, missing, sample in near_misses(view.requirement.formula, over_time):
-        time = plain(trajectory.times[sample], fine_clock(view))
-        words = (_part_text(view, part, over_time, sample) for part in missing)
+    clock = fine_clock(view)
+    violation = Side(view.requirement.formula, must_hold=False)
+    for met, missing, sample in near_misses(violation, trajectory.times, over_time):
+        words = []
+        for side in missing:
+            gaps, found = asked_for(side, trajectory.times, over_time, np.array([sample]))
+            word = _part_text(view, side.part, over_time, sample)
+            if 0 < gaps[0] < inf:
+                did = Side(side.part.children[0], side.must_hold)
+                word += f" ({did} at {plain(float(found[0]), clock)} s)"
+            words.append(word)
+        time = plain(trajectory.times[sample], clock)
         yield f"nearest to a violation while {listed([*map(str, met)])}, at t = {time} s: {'; '.join(words)}"
 
 
@@ -240,6 +255,8 @@ def _rarer(times: Array, wrong: NDArray[np.bool_], step: float, clock: int) -> s
     begin, end = (plain(time, clock) for time in stretch)
     if rare.sum() == 1:
         return f"{word} only at {begin} s"
+    if round((stretch[1] - stretch[0]) / step) + 1 == rare.sum():
+        return f"{word} only from {begin} to {end} s"
     return f"{word} for about {number(float(rare.sum()) * step)} s in total, longest from {begin} to {end} s"
 
 
@@ -257,12 +274,21 @@ def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
 def _shown_columns(view: View, trajectory: Trajectory, compared: dict[str, Array]) -> dict[str, Array]:
     """What is compared, then recorded signals that are not discrete; none if there are no input signals.
 
-    Parameters act at the start alone, so that the course of everything else decides nothing.
+    Parameters act at the start alone, so that the course of everything else decides nothing. Nor is the
+    absolute value of a signal told beside the signal.
     """
     found = {n: trajectory[n] for n in view.recorded if view.space.inputs and n in trajectory.columns}
     others = [n for n, c in found.items() if n not in compared and not view.is_discrete(n, c)]
+    sides = {str(side): side for p in view.requirement.formula.predicates for side in p.sides}
+    compared = {text: c for text, c in compared.items() if not _is_folded(sides[text], others)}
     columns = compared | {n: found[n] for n in others[: max(0, _MAX_SIGNALS - len(compared))]}
     return {text: column for text, column in columns.items() if np.isfinite(column).all()}
+
+
+def _is_folded(side: Expression, told: Collection[str]) -> bool:
+    """Whether a term is the absolute value of a signal, or of what is added to it, that is told itself."""
+    is_of_one = isinstance(side, Call) and side.function == "abs" and len(side.signals) == 1
+    return is_of_one and side.signals[0] in told
 
 
 def told_accuracy(view: View, name: str, column: Array) -> float:
@@ -290,6 +316,7 @@ def _drawn(
         slower_than=_SLOWEST_OSCILLATION * float(inside.times[-1]),
         kept=steps,
         most=most,
+        coarsest=_COARSEST if _is_judged(view, name) else _COARSEST_OF_OTHERS,
     )
 
 
@@ -315,6 +342,7 @@ def _close_up(view: View, inside: Trajectory, evaluation: Evaluation) -> Iterato
             claimed=claimed,
             slower_than=0.0,
             kept=(verdict.critical_time,),
+            coarsest=_COARSEST,
         )
         yield f"{name} around t = {plain(verdict.critical_time, fine_clock(view))} s: {told}"
 

@@ -170,7 +170,9 @@ class Questions:
         renumbers = self._variant.is_published
         numbered = ((n if renumbers else s.number, s) for n, s in enumerate(self._samples, start=1))
         told = (f"Sample {n}: {s.texts[s.depth]}" for n, s in numbered)
-        return "\n\n".join((f"Samples so far{left_out}, in the order in which they were simulated:", *told))
+        order = f"Samples so far{left_out}, in the order in which they were simulated"
+        more = "" if renumbers else "; more is told of those that were the best or the first somewhere"
+        return "\n\n".join((f"{order}{more}:", *told))
 
     def _latest(self) -> str:
         """All else of the latest sample, if less was told of it."""
@@ -291,7 +293,7 @@ class Questions:
         brief = inputs if why else as_signals(self._view, candidate, in_brief=True)
         texts = (
             _text(inputs, *head, changes, *found.full),
-            _text(inputs, *head, changes, *found.short),
+            _text(inputs, *head, changes if is_first else "", *found.short),
             _text(brief, *head, found.line),
         )
         best = min((s.robustness for s in self._judged if s.robustness is not None), default=None)

@@ -1,11 +1,10 @@
 """How far the recorded signals of a sample got, which says more than a robustness that is flat."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import fsum, inf
-from typing import TypeVar
 
 import numpy as np
 
@@ -17,12 +16,12 @@ from falsifier.llm.prompts.view import View
 # A value or a change of a discrete signal: its name, the value before, the value.
 Stage = tuple[str, float | None, float]
 
-T = TypeVar("T")
-
 # A signal went further if it left the range seen so far by more than this share of it.
 _FURTHER = 0.05
-# New things that are told, of these those of one signal, and times of new changes.
+# New things that are told, of these those of one signal, and times of changes.
 _MOST_NEW, _MOST_OF_ONE, _MOST_SWITCHES = 8, 3, 8
+# New changes of a signal of the requirement up to which it is a mode, and no counter.
+_MOST_OF_MODE = 6
 # Outputs and inputs that are told at each new change.
 _MOST_BESIDE = 6
 
@@ -33,8 +32,9 @@ class SampleProgress:
 
     stages: frozenset[Stage] = frozenset()
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    # Changes by the index at which each came first; of signals of the requirement, also again.
+    # Changes by the index at which each came first, and where those of the requirement's signals came again.
     changes: Mapping[int, tuple[Stage, ...]] = field(default_factory=dict)
+    again: frozenset[int] = frozenset()
 
     @classmethod
     def of(cls, view: View, trajectory: Trajectory) -> "SampleProgress":
@@ -42,21 +42,23 @@ class SampleProgress:
         columns = view.inside(trajectory).columns
         stages: set[Stage] = set()
         changes: dict[int, tuple[Stage, ...]] = {}
+        again: set[int] = set()
         ranges = {}
         for name in (name for name in view.recorded if name in columns):
             column = columns[name]
             if view.is_discrete(name, column):
                 begun = np.flatnonzero(np.diff(column, prepend=np.nan)).tolist()
                 stages |= {(name, None, value) for value in column[begun].tolist()}
-                told = _ends(begun[1:]) if name in view.formula_outputs else ()
+                if name in view.formula_outputs:
+                    again.update(begun[1 : _MOST_SWITCHES + 2])
                 for before, k in pairwise(begun):
                     change = (name, float(column[before]), float(column[k]))
-                    if change not in stages or k in told:
+                    if change not in stages:
                         stages.add(change)
                         changes[k] = (*changes.get(k, ()), change)
             elif np.isfinite(column).all():
                 ranges[name] = (float(column.min()), float(column.max()))
-        return cls(frozenset(stages), ranges, dict(sorted(changes.items())))
+        return cls(frozenset(stages), ranges, changes, frozenset(again))
 
 
 class Reached:
@@ -88,37 +90,46 @@ class Reached:
         return any(c not in self._stages for changes in progress.changes.values() for c in changes)
 
     def switches(self, progress: SampleProgress, trajectory: Trajectory, clock: int) -> str:
-        """When discrete signals made changes that no earlier sample made, and all else of that time.
+        """When discrete signals changed, and all else of that time.
 
-        Those of the requirement also where earlier samples made the same. It is to be called before the
-        sample is added; ``clock`` is the number of decimals of times.
+        Told are changes that no earlier sample made, those of the requirement's signals before others; then
+        others of the requirement's signals. It is to be called before the sample is added; ``clock`` is the
+        number of decimals of times.
         """
         judged = self._view.formula_outputs
-        new = {
-            k: [c for c in changes if c not in self._stages or c[0] in judged]
-            for k, changes in progress.changes.items()
-        }
-        few = self._few([change for changes in new.values() for change in changes])
-        discrete = {name for name, _, _ in progress.stages}
+        changes = [c for found in progress.changes.values() for c in found]
+        few = self._few([c for c in changes if c not in self._stages], but_all_of=judged)
+
+        def urgency(k: int) -> tuple[int, int]:
+            new = [c[0] in judged for c in progress.changes.get(k, ()) if c in few]
+            known = any(c[0] in judged for c in progress.changes.get(k, ()))
+            return (0 if any(new) else 1 if new else 2 if known else 3), k
+
+        times = {k for k, found in progress.changes.items() if any(c in few for c in found)} | progress.again
+        told = sorted(sorted(times, key=urgency)[:_MOST_SWITCHES])
         inputs = [r.name for r in self._view.space.inputs if r.name in trajectory.columns]
         names = [*list(progress.ranges)[:_MOST_BESIDE], *(inputs if len(inputs) <= _MOST_BESIDE else ())]
-        columns = {name: trajectory[name] for name in names}
-        told = []
-        for k, changes in new.items():
-            if any(change in few for change in changes):
-                beside = (
-                    f"{n} {self._view.labelled(n, float(c[k]), plain(float(c[k]), column_decimals(c)))}"
-                    for n, c in columns.items()
-                )
-                time = f"at {plain(trajectory.times[k], clock)} s"
-                together = (
-                    self._stage((name, float(trajectory[name][k - 1]), float(trajectory[name][k])))
-                    for name in self._view.recorded
-                    if name in discrete and trajectory[name][k - 1] != trajectory[name][k]
-                )
-                told.append(f"{', '.join(together)} {time}" + (f" ({', '.join(beside)})" if columns else ""))
-        is_all = len(told) == sum(map(bool, new.values())) <= _MOST_SWITCHES
-        return "; ".join((*told[:_MOST_SWITCHES], *([] if is_all else ["..."])))
+        texts = (self._change(progress, trajectory, names, k, clock) for k in told)
+        new = {k for k, found in progress.changes.items() if any(c not in self._stages for c in found)}
+        is_all = new | progress.again <= set(told)
+        return "; ".join((*texts, *([] if is_all else ["..."])))
+
+    def _change(
+        self, progress: SampleProgress, trajectory: Trajectory, names: Sequence[str], k: int, clock: int
+    ) -> str:
+        columns = trajectory.columns
+        discrete = {name for name, _, _ in progress.stages}
+        beside = (
+            f"{n} {self._view.labelled(n, float(c[k]), plain(float(c[k]), column_decimals(c)))}"
+            for n, c in ((n, columns[n]) for n in names)
+        )
+        together = (
+            self._stage((n, float(columns[n][k - 1]), float(columns[n][k])))
+            for n in self._view.recorded
+            if n in discrete and columns[n][k - 1] != columns[n][k]
+        )
+        words = f"{', '.join(together)} at {plain(trajectory.times[k], clock)} s"
+        return f"{words} ({', '.join(beside)})" if names else words
 
     @property
     def unmoved(self) -> str:
@@ -131,12 +142,15 @@ class Reached:
         return f"The same in all samples: {', '.join(same)}." if same else ""
 
     @staticmethod
-    def _few(stages: Sequence[Stage]) -> list[Stage]:
+    def _few(stages: Sequence[Stage], *, but_all_of: Collection[str] = ()) -> list[Stage]:
         """Of each signal its first stages and its last one: of a counter, not all."""
         by_name: dict[str, list[Stage]] = {}
         for stage in stages:
             by_name.setdefault(stage[0], []).append(stage)
-        return [stage for found in by_name.values() for stage in _ends(found)]
+        for name, found in by_name.items():
+            if name not in but_all_of or len(found) > _MOST_OF_MODE:
+                found[_MOST_OF_ONE - 1 :] = found[_MOST_OF_ONE - 1 :][-1:]
+        return [stage for found in by_name.values() for stage in found]
 
     def rank(self, progress: SampleProgress) -> tuple[float, float]:
         """How far a sample got: its stages, of which rare ones count more; then the share of all ranges."""
@@ -174,8 +188,3 @@ class Reached:
             if low < least - least_new:
                 digits = resolving(least, least - low, 3)
                 yield f"{name} down to {number(low, digits)}, before {number(least, digits)}"
-
-
-def _ends(found: Sequence[T]) -> Sequence[T]:
-    """The first ones and the last one."""
-    return [*found[: _MOST_OF_ONE - 1], *found[_MOST_OF_ONE - 1 :][-1:]]

@@ -1,9 +1,11 @@
 """What must fail together, or for long, so that a requirement is violated; how close a sample came."""
 
 from collections.abc import Iterator, Mapping
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.llm.prompts.courses import Array, longest_stretch
 from falsifier.stl import Formula
@@ -27,7 +29,7 @@ class NearMiss(NamedTuple):
     """When a violation was nearest while most did what they must do together, but not all."""
 
     met: tuple[Side, ...]
-    missing: tuple[Formula, ...]
+    missing: tuple[Side, ...]
     sample: int
 
 
@@ -40,14 +42,14 @@ class Recurrence(NamedTuple):
     end: float  # and the last one
 
 
-def at_one_time(formula: Formula) -> Side:
-    """What must hold, or fail, at some time so that a formula is violated.
+def at_one_time(side: Side) -> Side:
+    """What must hold, or fail, at some time so that a formula does.
 
     >>> from falsifier.stl import parse
-    >>> str(at_one_time(parse("G not F[0,3] (x >= 2)")))
+    >>> str(at_one_time(Side(parse("G not F[0,3] (x >= 2)"), must_hold=False)))
     'x >= 2 holds'
     """
-    must_hold = False
+    formula, must_hold = side
     while isinstance(formula, Not | (Eventually if must_hold else Always)):
         must_hold, formula = must_hold != isinstance(formula, Not), formula.operand
     return Side(formula, must_hold)
@@ -71,27 +73,54 @@ def longest_failure(
     return None if found is None else longest_stretch(times, over_time[found.condition] < 0)
 
 
-def near_misses(formula: Formula, over_time: Mapping[Formula, Array]) -> Iterator[NearMiss]:
+def near_misses(side: Side, times: Array, over_time: Mapping[Formula, Array]) -> Iterator[NearMiss]:
     """When as many as ever, but not all, did what they must do together: once for each of those that did not.
 
-    Nothing of those that did so at all times: what was missing then is told without them.
+    Nothing of those that did so at all times: what was missing then is told without them. Of equally near
+    times, that at which what a missing window asks for was least far away. What never did what it must is
+    looked at in the same way.
     """
-    sides = list(_divided(at_one_time(formula)))
+    sides = list(_divided(at_one_time(side)))
     margins = np.array([-over_time[part] if must_hold else over_time[part] for part, must_hold in sides])
     asked = ~np.isnan(margins).any(axis=0)
     is_met = margins < 0
     is_always_met = np.asarray(is_met[:, asked].all(axis=1))
     counts = is_met.sum(axis=0) * asked
     most = int(counts.max())
-    if most in (0, len(sides)):
+    if most == len(sides):
         return
     for met in np.unique(is_met[:, counts == most], axis=1).T[::-1][:_MOST_MISSES]:
-        if is_always_met[met].all():
+        if is_always_met[met].all():  # or none is met
             continue
         where = np.flatnonzero((is_met == met[:, None]).all(axis=0) & asked)
-        sample = int(where[margins[~met][:, where].max(axis=0).argmin()])
-        done = tuple(side for side, so in zip(sides, met.tolist(), strict=True) if so)
-        yield NearMiss(done, tuple(side.part for side in sides if side not in done), sample)
+        done = tuple(one for one, so in zip(sides, met.tolist(), strict=True) if so)
+        missing = tuple(one for one in sides if one not in done)
+        worst = margins[~met][:, where].max(axis=0)
+        nearest = where[worst == worst.min()]
+        gaps = [asked_for(one, times, over_time, nearest)[0] for one in missing]
+        yield NearMiss(done, missing, int(nearest[np.sum(gaps, axis=0).argmin()]))
+    for one, margin in zip(sides, margins, strict=True):
+        if not (margin < 0).any() and at_one_time(one) != one:
+            yield from near_misses(one, times, over_time)
+
+
+def asked_for(
+    side: Side, times: Array, over_time: Mapping[Formula, Array], samples: NDArray[np.intp]
+) -> tuple[Array, Array]:
+    """How far in s what a missing window asks for was from the window, seen from samples; and when it was.
+
+    Both are 0 where a side has no window, and infinite where what it asks for never was.
+    """
+    part, must_hold = side
+    if not isinstance(part, Eventually if must_hold else Always):
+        return np.zeros(len(samples)), np.zeros(len(samples))
+    margin = over_time[part.operand]
+    found = np.concatenate(([-inf], times[margin >= 0 if must_hold else margin < 0], [inf]))
+    start, end = (part.window.start, part.window.end) if part.window else (0.0, float(times[-1]))
+    first = np.searchsorted(found, times[samples] + start)
+    before, after = found[first - 1], found[first]
+    early, late = times[samples] + start - before, after - times[samples] - end
+    return np.minimum(early, late), np.where(early < late, before, after)
 
 
 def _divided(side: Side) -> Iterator[Side]:

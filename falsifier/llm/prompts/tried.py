@@ -47,11 +47,9 @@ class Tried:
             return f"{r.name} = {listed}" if left else ""
         edges = [r.low, *tried, r.high]
         gaps = np.diff(r.share_of(np.array(edges)))
-        widest = int(gaps.argmax())
-        if gaps[widest] <= _WIDE:
-            return ""
-        low, high = bounds(edges[widest], edges[widest + 1], _DIGITS)
-        return f"{r.name} between {low} and {high}"
+        wide = (bounds(edges[k], edges[k + 1], _DIGITS) for k in np.flatnonzero(gaps > _WIDE).tolist())
+        told = ", ".join(f"between {low} and {high}" for low, high in wide)
+        return f"{r.name} {told}" if told else ""
 
     def _possible(self, r: InputRange | ParameterRange) -> Iterator[int]:
         named = [n for _, n in r.items]

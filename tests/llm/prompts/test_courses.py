@@ -42,12 +42,11 @@ def test_change_list() -> None:
     assert long.startswith("0, then 1 from 0.1 s") and "85 more changes" in long and long.endswith("10 s")
 
 
-def test_dwell_list_names_the_shortest_stay_after_an_entry() -> None:
-    assert dwell_list(TIMES, GEAR, clock=2) == "2: entered 2 times, shortest stay 0.25 s from 5 s"
+def test_dwell_list_names_the_shortest_stay() -> None:
+    told = "2 at 1, the shortest 1.6 s from 0 s; 2 at 2, the shortest 0.25 s from 5 s"
+    assert dwell_list(TIMES, GEAR, clock=2) == told
     back_at_the_end = dwell_list(TIMES, steps((0, 1), (2, 2), (3, 1), (4, 2), (5, 1)), clock=2)
-    assert back_at_the_end == (
-        "1: entered 2 times, shortest stay 1 s from 3 s; 2: entered 2 times, shortest stay 1 s from 2 s"
-    )
+    assert back_at_the_end == "3 at 1, the shortest 1 s from 3 s; 2 at 2, the shortest 1 s from 2 s"
     assert dwell_list(TIMES, steps((0, 1), (2, 2), (3, 3)), clock=2) == "", "the changes tell as much"
 
 
@@ -82,7 +81,7 @@ def test_a_course_that_needs_more_points_says_how_exact_it_is() -> None:
 def test_of_what_is_too_irregular_only_the_extremes_are_told() -> None:
     wild = np.random.default_rng(0).uniform(-1, 1, len(TIMES))
     wild[[300, 700]] = -2.0, 3.0
-    told = course(TIMES, wild, clock=2, tolerance=0.1, slower_than=0.0, most=6)
+    told = course(TIMES, wild, clock=2, tolerance=0.1, slower_than=0.0, most=6, coarsest=0.3)
     assert told == "least -2 at 3 s, greatest 3 at 7 s, and too irregular in between to be told"
 
 
@@ -98,7 +97,7 @@ def test_near_a_threshold_points_are_finer_once_the_rest_is_exact_enough() -> No
 )
 def test_straight_lines_between_breakpoints_stay_within_the_tolerance(column: NDArray[np.float64]) -> None:
     text = course(TIMES, column, clock=2, tolerance=0.02 * float(np.ptp(column)), slower_than=0.5)
-    assert "oscillates" not in text and "within" not in text
+    assert "swings" not in text and "within" not in text
     error = np.abs(np.interp(TIMES, *drawn_points(text)) - column)
     assert error.max() <= 0.02 * np.ptp(column) + 1e-12
 
@@ -127,7 +126,7 @@ def test_lines_and_oscillations_take_turns_and_a_period_that_changes_is_told_at_
     text = course(TIMES, burst, clock=1, tolerance=0.08, slower_than=0.5)
     before, swing, after = text.split("; ")
     assert before.startswith("0:0 3:0") and after.endswith(" 10:0")
-    assert swing.startswith("oscillates from 3.1 to 6 s with period 0.2 s, between 3.1:-2 ")
+    assert swing.startswith("swings from 3.1 to 6 s with period 0.2 s, between 3.1:-2 ")
     slowing = np.where(TIMES < 6, 2 * np.sin(2 * np.pi * 2 * TIMES), FAST)
     told = course(TIMES, slowing, clock=1, tolerance=0.08, slower_than=1.0)
     assert " s with period 0.5 s, at the end 0.2 s, between" in told

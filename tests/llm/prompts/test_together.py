@@ -6,7 +6,7 @@ import pytest
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import listed
 from falsifier.evaluation.evaluate import compiled
-from falsifier.llm.prompts.together import longest_failure, near_misses, recurring
+from falsifier.llm.prompts.together import Side, longest_failure, near_misses, recurring
 from falsifier.stl import parse
 
 TIMES = np.linspace(0.0, 10.0, 11)
@@ -27,7 +27,18 @@ TRAJECTORY = Trajectory(TIMES, {"x": TIMES.copy(), "y": np.where(TIMES < 4, 5.0,
             "G[0,8] (x >= 5 -> F[0,2] (y >= 2) or x <= 8)",
             [("x >= 5 holds and F[0,2] (y >= 2) fails", 8, "x <= 8")],
         ),
+        (
+            "not (F (x >= 3) and F (x >= 9 and y >= 3))",
+            [("x >= 9 holds", 9, "y >= 3"), ("y >= 3 holds", 3, "x >= 9")],
+        ),
         ("G (x >= 0 or y <= 2)", [("y <= 2 fails", 0, "x >= 0")]),
+        (
+            "not F[0,5] (x >= 1 and x <= 2 and F[0,1] (y <= 0))",
+            [
+                ("x >= 1 holds and x <= 2 holds", 2, "F[0,1] (y <= 0)"),
+                ("x >= 1 holds and F[0,1] (y <= 0) holds", 3, "x <= 2"),
+            ],
+        ),
         ("G (x >= 20 or y <= 9)", []),
         ("G (x <= 6 and y <= 2)", []),
     ],
@@ -35,8 +46,9 @@ TRAJECTORY = Trajectory(TIMES, {"x": TIMES.copy(), "y": np.where(TIMES < 4, 5.0,
 def test_how_close_a_violation_was(formula: str, told: list[tuple[str, int, str]]) -> None:
     parsed = parse(formula)
     over_time = compiled(parsed, 1.0, len(TIMES)).courses(TRAJECTORY)
-    found = list(near_misses(parsed, over_time))
-    assert [(listed(list(map(str, m.met))), m.sample, ", ".join(map(str, m.missing))) for m in found] == told
+    found = list(near_misses(Side(parsed, must_hold=False), TIMES, over_time))
+    parts = [", ".join(str(side.part) for side in m.missing) for m in found]
+    assert [(listed([*map(str, m.met)]), m.sample, p) for m, p in zip(found, parts, strict=True)] == told
 
 
 def test_the_longest_failure_of_what_must_recur() -> None:
