@@ -25,7 +25,7 @@ _LOG = logging.getLogger(__name__)
 # Answers of the LLM, the first of which knows nothing of the system, before it must have helped.
 _TRIAL = 2
 # Factor of the surrogate's turns for each further answer that did not help: a useless LLM has few turns.
-_GROWTH = 4
+_GROWTH = 2
 # An answer helps if it lowers the best robustness by at least this share; else an LLM that creeps downwards
 # would keep its turns for ever.
 _NOTABLE = 0.1

@@ -69,7 +69,7 @@ def turns_taken(count: int, *, llm: str = "") -> str:
 
 
 def test_turns_follow_what_the_llm_brings() -> None:
-    assert turns_taken(26) == "LSL" + 4 * "S" + "L" + 16 * "S" + "L" + "S", "ever more rarely"
+    assert turns_taken(20) == "LSLSSLSSSSLSSSSSSSSL", "ever more rarely"
     assert turns_taken(8, llm="-+++-") == "LSLLLLSL", "as long as its answers help"
 
 
