@@ -36,15 +36,15 @@ def on_first(space: SearchSpace) -> str:
     return _FIRST.format(_FIRST_OF["jumping" if _only_jumps(space) and not space.parameters else "inputs"])
 
 
-def on_next(space: SearchSpace, *, is_timed: bool, is_flat: bool) -> str:
-    """How to use the samples so far.
+def on_next(space: SearchSpace, *, count: int, is_timed: bool, is_flat: bool) -> str:
+    """How to use so many samples; empty if there is nothing to say.
 
     ``is_timed``: the times that decided their robustness tell something; ``is_flat``: it was the same in all.
     """
-    what = "inputs" if space.inputs else "parameters"
+    what, such = "inputs" if space.inputs else "parameters", "" if _only_jumps(space) else _SUCH
     on_time = [_ON_TIME.format(what=what)] if is_timed else []
-    on_strategy = (_ON_PLATEAU if is_flat else _ON_STRATEGY).format(such="" if _only_jumps(space) else _SUCH)
-    return "\n".join((*on_time, on_strategy))
+    on_strategy = [(_ON_PLATEAU if is_flat else _ON_STRATEGY).format(such=such)] if count > 1 else []
+    return "\n".join((*on_time, *on_strategy))
 
 
 def _only_jumps(space: SearchSpace) -> bool:

@@ -98,8 +98,8 @@ def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda
         count = len(stays) + (found[-1][0] == value)
         if count > 1:
             length, start = min(stays)
-            stay = f"the shortest {plain(length, 3)} s from {plain(start, clock)} s"
-            words.append(f"{count} at {label(value, plain(value, 6))}, {stay}")
+            shortest = f"the shortest for {plain(length, 3)} s from {plain(start, clock)} s"
+            words.append(f"{count} times at {label(value, plain(value, 6))}, {shortest}")
     return "; ".join(words)
 
 

@@ -47,6 +47,7 @@ _LONGEST = (
     "{condition} was false longest in one piece for {longest}; {limit} s violate the requirement. That tells "
     "more than the robustness: look at how that piece began and ended."
 )
+_UNTRIED = "Not tried so far: {}. See what happens there, too."
 _FLAT = "The robustness is flat: it was {lowest} in all {count} samples, so its value gives no direction."
 
 # How much of a sample is told.
@@ -209,10 +210,11 @@ class Questions:
         if waiting:
             yield "\n".join((_PENDING, *waiting))
         if is_own and self._judged:
-            is_flat = self._is_flat()
-            is_ranked_otherwise = is_flat or self._best_first()[0].failure > 0
+            is_ranked_otherwise = self._is_flat() or self._best_first()[0].failure > 0
             is_timed = not is_ranked_otherwise and any(s.is_timed for s in self._judged)
-            yield on_next(self._view.space, is_timed=is_timed, is_flat=is_flat)
+            count, is_flat = len(self._judged), self._is_flat()
+            if advice := on_next(self._view.space, count=count, is_timed=is_timed, is_flat=is_flat):
+                yield advice
         if is_own and _RUN.search(self._lasting()):
             yield _RUNS
         yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
@@ -238,7 +240,8 @@ class Questions:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
             yield "\n".join((*few, *self._climb.lines))
         if self._climb.is_told or self._is_flat():
-            yield from (text for text in (self._reached.unmoved, self._tried.text) if text)
+            untried = _UNTRIED.format(gaps) if (gaps := self._tried.gaps) else ""
+            yield from (text for text in (self._reached.unmoved, untried) if text)
 
     def _is_flat(self) -> bool:
         """Whether several samples had the same robustness, and none had another."""

@@ -34,10 +34,9 @@ class Tried:
             self._values.setdefault(name, set()).add(value)
 
     @property
-    def text(self) -> str:
+    def gaps(self) -> str:
         """What no sample tried; empty if they tried about all."""
-        gaps = [gap for r in self.view.space.ranges if (gap := self._gap(r))]
-        return f"Not tried so far: {'; '.join(gaps)}." if gaps else ""
+        return "; ".join(gap for r in self.view.space.ranges if (gap := self._gap(r)))
 
     def _gap(self, r: InputRange | ParameterRange) -> str:
         tried = sorted(self._values.get(r.name, ()))
@@ -47,9 +46,16 @@ class Tried:
             return f"{r.name} = {listed}" if left else ""
         edges = [r.low, *tried, r.high]
         gaps = np.diff(r.share_of(np.array(edges)))
-        wide = (bounds(edges[k], edges[k + 1], _DIGITS) for k in np.flatnonzero(gaps > _WIDE).tolist())
-        told = ", ".join(f"between {low} and {high}" for low, high in wide)
-        return f"{r.name} {told}" if told else ""
+        told = []
+        for k in np.flatnonzero(gaps > _WIDE).tolist():
+            low, high = bounds(edges[k], edges[k + 1], _DIGITS)
+            if edges[k] not in tried:
+                told.append(f"from {low} to below {high}")
+            elif edges[k + 1] not in tried:
+                told.append(f"above {low} up to {high}")
+            else:
+                told.append(f"between {low} and {high}")
+        return f"{r.name} {', '.join(told)}" if told else ""
 
     def _possible(self, r: InputRange | ParameterRange) -> Iterator[int]:
         named = [n for _, n in r.items]

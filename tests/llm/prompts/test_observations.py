@@ -137,7 +137,7 @@ def test_courses_and_changes_end_where_the_requirement_stops_looking() -> None:
     steps = (TIMES > 2) * 1.0 + (TIMES > 4.05) - (TIMES > 5.05) + 8 * (TIMES > 7)
     lines = facts(*seen("G[0,3] F[0,3] (x <= 19)", steps))
     assert line(lines, "x: ") == "x: 0, then 1 from 2.1 s, 2 from 4.1 s, 1 from 5.1 s"
-    assert line(lines, "x stays: ") == "x stays: 2 at 1, the shortest 2 s from 2.1 s"
+    assert line(lines, "x stays: ") == "x stays: 2 times at 1, the shortest for 2 s from 2.1 s"
     over_time, around = courses(*seen("G[2,6] (x <= 9)", TIMES.copy()))
     assert (over_time, around.split()[-1]) == ("x: 0:0 6:6", "6:6")
     (only,) = courses(*seen("x <= 9", TIMES.copy()))
