@@ -218,7 +218,7 @@ def _predicates(
     Of the one that decided without being false all is told by then, and of those that compare nothing but a
     discrete signal whose changes are all listed.
     """
-    clock, step = fine_clock(view), trajectory.step
+    clock = fine_clock(view)
     listed = {
         name
         for name in view.recorded
@@ -242,15 +242,15 @@ def _predicates(
         elif wrong.all():
             found = f"never true, closest at {plain(nearest, clock)} s, off by {closest}"
         else:
-            found = _rarer(times, wrong, step, clock)
-        yield f"{predicate}, from {plain(start, clock)} to {plain(end, clock)} s: {found}"
+            found = _rarer(trajectory, over_time[predicate], clock)
+        gaps = " where it counts" * (round((end - start) / trajectory.step) + 1 > len(times))
+        yield f"{predicate}, from {plain(start, clock)} to {plain(end, clock)} s{gaps}: {found}"
 
 
-def _rarer(times: Array, wrong: NDArray[np.bool_], step: float, clock: int) -> str:
-    """When a predicate was false, or when it was true, if that was for less time."""
-    is_mostly_wrong = 2 * wrong.sum() > len(wrong)
-    word, rare = ("true", ~wrong) if is_mostly_wrong else ("false", wrong)
-    stretch = courses.longest_stretch(times, rare)
+def _rarer(trajectory: Trajectory, margin: Array, clock: int) -> str:
+    """When a predicate was false, or when it was true, if that was for less time; NaN is neither."""
+    word, rare = min(("false", margin < 0), ("true", margin >= 0), key=lambda one: int(one[1].sum()))
+    step, stretch = trajectory.step, courses.longest_stretch(trajectory.times, rare)
     assert stretch is not None, "it was neither always true nor never"
     begin, end = (plain(time, clock) for time in stretch)
     if rare.sum() == 1:
