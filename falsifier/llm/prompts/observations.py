@@ -72,9 +72,9 @@ class Observed:
 def observed(view: View, evaluation: Evaluation) -> Observed:
     """Look at a judged sample once.
 
-    All of it tells what broke and what decided, the parts of the formula, when each predicate was false, all
-    signals over time, and those that decided more exactly around that time. Less of it tells what decided,
-    the parts, when each predicate was false, all discrete signals, and what was compared there over time.
+    All of it tells what broke and what decided, the parts of the formula, when each predicate was false and
+    when a violation was nearest, all signals over time, and those that decided more exactly around that time.
+    Less of it tells of signals only the discrete ones, and what was compared where it was decided over time.
     """
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     assert verdict is not None
@@ -219,7 +219,7 @@ def _predicates(
     discrete signal whose changes are all listed.
     """
     clock = fine_clock(view)
-    listed = {
+    in_full = {
         name
         for name in view.recorded
         if name in trajectory.columns
@@ -227,7 +227,7 @@ def _predicates(
         and np.count_nonzero(np.diff(trajectory[name])) <= courses.SHOWN_CHANGES
     }
     for predicate in view.requirement.formula.predicates:
-        if len(predicate.signals) == 1 and listed.issuperset(predicate.signals):
+        if len(predicate.signals) == 1 and in_full.issuperset(predicate.signals):
             continue
         asked = ~np.isnan(over_time[predicate])
         margin, times = over_time[predicate][asked], trajectory.times[asked]
