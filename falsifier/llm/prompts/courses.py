@@ -70,7 +70,7 @@ def change_list(times: Array, column: Array, *, clock: int, label: Label = lambd
 def _changes(begun: Sequence[tuple[float, float]], clock: int, label: Label) -> Iterator[tuple[str, int]]:
     """Values and the times in s at which they begin, in words, with their number; regular ones together."""
     steps: Array = np.diff(np.array(begun), axis=0)
-    alike = np.asarray(np.isclose(steps[1:], steps[:-1], rtol=1e-6).all(axis=1))
+    alike = np.asarray(np.isclose(steps[1:], steps[:-1], rtol=1e-6, atol=0).all(axis=1))
     k = 0
     while k < len(begun):
         value, start = begun[k]
@@ -98,7 +98,7 @@ def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda
         count = len(stays) + (found[-1][0] == value)
         if count > 1:
             length, start = min(stays)
-            shortest = f"the shortest for {plain(length, 3)} s from {plain(start, clock)} s"
+            shortest = f"the shortest for {number(length, 6)} s from {plain(start, clock)} s"
             words.append(f"{count} times at {label(value, plain(value, 6))}, {shortest}")
     return "; ".join(words)
 

@@ -72,9 +72,9 @@ class Observed:
 def observed(view: View, evaluation: Evaluation) -> Observed:
     """Look at a judged sample once.
 
-    All of it tells what broke and what decided, the parts of the formula, when each predicate was false, all
-    signals over time, and those that decided more exactly around that time. Less of it tells what decided,
-    the parts, when each predicate was false, all discrete signals, and what was compared there over time.
+    All of it tells what broke and what decided, the parts of the formula, when each predicate was false and
+    when a violation was nearest, all signals over time, and those that decided more exactly around that time.
+    Less of it tells of signals only the discrete ones, and what was compared where it was decided over time.
     """
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     assert verdict is not None
@@ -218,8 +218,8 @@ def _predicates(
     Of the one that decided without being false all is told by then, and of those that compare nothing but a
     discrete signal whose changes are all listed.
     """
-    clock, step = fine_clock(view), trajectory.step
-    listed = {
+    clock = fine_clock(view)
+    in_full = {
         name
         for name in view.recorded
         if name in trajectory.columns
@@ -227,7 +227,7 @@ def _predicates(
         and np.count_nonzero(np.diff(trajectory[name])) <= courses.SHOWN_CHANGES
     }
     for predicate in view.requirement.formula.predicates:
-        if len(predicate.signals) == 1 and listed.issuperset(predicate.signals):
+        if len(predicate.signals) == 1 and in_full.issuperset(predicate.signals):
             continue
         asked = ~np.isnan(over_time[predicate])
         margin, times = over_time[predicate][asked], trajectory.times[asked]
@@ -242,15 +242,15 @@ def _predicates(
         elif wrong.all():
             found = f"never true, closest at {plain(nearest, clock)} s, off by {closest}"
         else:
-            found = _rarer(times, wrong, step, clock)
-        yield f"{predicate}, from {plain(start, clock)} to {plain(end, clock)} s: {found}"
+            found = _rarer(trajectory, over_time[predicate], clock)
+        gaps = " where it counts" * (round((end - start) / trajectory.step) + 1 > len(times))
+        yield f"{predicate}, from {plain(start, clock)} to {plain(end, clock)} s{gaps}: {found}"
 
 
-def _rarer(times: Array, wrong: NDArray[np.bool_], step: float, clock: int) -> str:
-    """When a predicate was false, or when it was true, if that was for less time."""
-    is_mostly_wrong = 2 * wrong.sum() > len(wrong)
-    word, rare = ("true", ~wrong) if is_mostly_wrong else ("false", wrong)
-    stretch = courses.longest_stretch(times, rare)
+def _rarer(trajectory: Trajectory, margin: Array, clock: int) -> str:
+    """When a predicate was false, or when it was true, if that was for less time; NaN is neither."""
+    word, rare = min(("false", margin < 0), ("true", margin >= 0), key=lambda one: int(one[1].sum()))
+    step, stretch = trajectory.step, courses.longest_stretch(trajectory.times, rare)
     assert stretch is not None, "it was neither always true nor never"
     begin, end = (plain(time, clock) for time in stretch)
     if rare.sum() == 1:

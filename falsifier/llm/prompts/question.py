@@ -292,7 +292,7 @@ class Questions:
             robustness += f" ({margin_words(verdict.robustness, verdict.predicate)})"
         reached = f"the first to reach: {'; '.join(news)}" if news else ""
         head = (robustness, doubt, *notes, reached)
-        changes = f"changes, with all else then: {switches}" if switches else ""
+        changes = f"changes, with other signals then: {switches}" if switches else ""
         brief = inputs if why else as_signals(self._view, candidate, in_brief=True)
         texts = (
             _text(inputs, *head, changes, *found.full),

@@ -90,7 +90,7 @@ class Reached:
         return any(c not in self._stages for changes in progress.changes.values() for c in changes)
 
     def switches(self, progress: SampleProgress, trajectory: Trajectory, clock: int) -> str:
-        """When discrete signals changed, and all else of that time.
+        """When discrete signals changed, and other signals at that time.
 
         Told are changes that no earlier sample made, those of the requirement's signals before others; then
         others of the requirement's signals. It is to be called before the sample is added; ``clock`` is the

@@ -80,23 +80,24 @@ def near_misses(side: Side, times: Array, over_time: Mapping[Formula, Array]) ->
     times, that at which what a missing window asks for was least far away. What never did what it must is
     looked at in the same way.
     """
-    sides = list(_divided(at_one_time(side)))
-    margins = np.array([-over_time[part] if must_hold else over_time[part] for part, must_hold in sides])
-    asked = ~np.isnan(margins).any(axis=0)
+    inner = at_one_time(side)
+    sides = list(_divided(inner))
+    asked = np.flatnonzero(~np.isnan(over_time[inner.part]))  # a part may be asked for elsewhere, too
+    margins = np.array([over_time[part][asked] * (-1 if must_hold else 1) for part, must_hold in sides])
     is_met = margins < 0
-    is_always_met = np.asarray(is_met[:, asked].all(axis=1))
-    counts = is_met.sum(axis=0) * asked
+    is_always_met = np.asarray(is_met.all(axis=1))
+    counts = is_met.sum(axis=0)
     most = int(counts.max())
     if most == len(sides):
         return
     for met in np.unique(is_met[:, counts == most], axis=1).T[::-1][:_MOST_MISSES]:
         if is_always_met[met].all():  # or none is met
             continue
-        where = np.flatnonzero((is_met == met[:, None]).all(axis=0) & asked)
+        where = np.flatnonzero((is_met == met[:, None]).all(axis=0))
         done = tuple(one for one, so in zip(sides, met.tolist(), strict=True) if so)
         missing = tuple(one for one in sides if one not in done)
         worst = margins[~met][:, where].max(axis=0)
-        nearest = where[worst == worst.min()]
+        nearest = asked[where[worst == worst.min()]]
         gaps = [asked_for(one, times, over_time, nearest)[0] for one in missing]
         yield NearMiss(done, missing, int(nearest[np.sum(gaps, axis=0).argmin()]))
     for one, margin in zip(sides, margins, strict=True):

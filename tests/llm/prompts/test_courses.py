@@ -38,6 +38,8 @@ def test_change_list() -> None:
     counted = steps((0, 5), (1, 4), (2, 4.5), *((t, t + 2) for t in range(3, 9)), (9.5, 0))
     told = "5, then 4 from 1 s, 4.5 from 2 s, 5 from 3 s, by +1 every 1 s to 10 from 8 s, 0 from 9.5 s"
     assert change_list(TIMES, counted, clock=2) == told
+    uneven = steps((0, 0), (1, 1), (3, 2), (4, 3), (6, 4), (7, 5), (9, 6))
+    assert "every" not in change_list(TIMES * 1e-9, uneven, clock=10), "however short the times are"
     long = change_list(TIMES, (np.arange(1001) // 10 % 2).astype(np.float64), clock=2)
     assert long.startswith("0, then 1 from 0.1 s") and "85 more changes" in long and long.endswith("10 s")
 
@@ -49,6 +51,8 @@ def test_dwell_list_names_the_shortest_stay() -> None:
     told = "3 times at 1, the shortest for 1 s from 3 s; 2 times at 2, the shortest for 1 s from 2 s"
     assert back_at_the_end == told
     assert dwell_list(TIMES, steps((0, 1), (2, 2), (3, 3)), clock=2) == "", "the changes tell as much"
+    short = dwell_list(TIMES * 1e-6, steps((0, 1), (2, 2), (3, 1)), clock=8)
+    assert short == "2 times at 1, the shortest for 2e-06 s from 0 s"
 
 
 @pytest.mark.parametrize("name", ["AT1", "AT51", "CC4", "NN", "SC", "F16", "PulseMeter"])

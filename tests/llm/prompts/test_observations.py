@@ -95,6 +95,13 @@ def test_of_a_predicate_it_is_told_when_it_was_false(limit: str, told: str) -> N
     assert line(lines, f"{limit}, from 0 to 10 s: ").endswith(told)
 
 
+def test_of_a_predicate_nothing_is_told_of_times_at_which_it_does_not_count() -> None:
+    x = np.where((TIMES >= 2) & (TIMES <= 8), 1.0, 0.0)
+    lines = facts(*seen("G[0,3] (x <= 0.5) and G[7,10] (x <= 0.5) and u <= 9", x + 0.1))
+    told = "false for about 2.2 s in total, longest from 2 to 3 s"
+    assert line(lines, "x <= 0.5, ") == f"x <= 0.5, from 0 to 10 s where it counts: {told}"
+
+
 def test_both_sides_of_the_connectives_on_the_way_are_told() -> None:
     lines = facts(*seen("G[0,10] (x <= 11) and (F[0,10] (x >= 3) or G[0,10] (u >= 1))", TIMES.copy()))
     assert "G[0,10] (x <= 11) robustness +1 m" in line(lines, "conjuncts at t = 0 s: ")

@@ -196,7 +196,7 @@ def test_changes_of_discrete_signals_are_told_with_the_other_signals() -> None:
     still, brisk = [0.0] * 7 + [325.0] * 3, [100.0] * 7 + [0.0] * 3
     problem = transmission("AT51")[0]
     _, changing = told(problem, "MP5", sampled(problem, still, brisk, [90.0] * 7 + [0.0] * 3))
-    line, again = re.findall("changes, with all else then: (.*)", changing)
+    line, again = re.findall("changes, with other signals then: (.*)", changing)
     first, *later = line.split("; ")
     assert re.fullmatch(r"gear 1 -> 2 at \S+ s \(speed \S+, rpm \S+, throttle 100, brake 0\)", first)
     assert [change.partition(" at ")[0] for change in later] == ["gear 2 -> 3", "gear 3 -> 4"]

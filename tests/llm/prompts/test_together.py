@@ -40,6 +40,9 @@ TRAJECTORY = Trajectory(TIMES, {"x": TIMES.copy(), "y": np.where(TIMES < 4, 5.0,
             ],
         ),
         ("G (x >= 20 or y <= 9)", []),
+        # What is asked for elsewhere, too, counts only where it would violate the requirement.
+        ("G[0,2] (x <= 8 or y <= 9) or G[5,10] (x <= 8)", []),
+        ("G[0,2] (x <= 8 or y <= 2) or G[3,10] (x <= 8 and y <= 2)", []),
         ("G (x <= 6 and y <= 2)", []),
     ],
 )
