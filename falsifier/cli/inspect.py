@@ -95,7 +95,7 @@ def init(*, fmus: tuple[Path, ...], out: Path | None) -> None:
         _existing_fmu(nameless)
     usual = fmus[0].with_suffix(".toml") if len(fmus) == 1 else fmus[0].with_name("system.toml")
     path = in_existing_folder(out or usual)
-    if path.exists():
+    if path.exists() or path.is_symlink():  # one that leads back to itself
         raise SpecError(f"{path} already exists: choose another --out, or delete it first")
     text = _starter(fmus, path)
     problem_of_starter(text, path)
