@@ -61,7 +61,7 @@ _TOGETHER = (
     "What must not happen is a conjunction: the requirement is violated only if all its parts hold at one "
     "time, from which a part with a window looks ahead. Of their robustness values there the smallest counts."
 )
-_UNTIL = "An until fails where its left side fails before its right side holds, or its right side never does."
+_UNTIL = "An until fails where its left side fails before its right side holds, or its right side never holds."
 _RECURRENCE = (
     "The requirement is violated if {condition} stays false for {length} s in one piece between t = {start} "
     "and {end} s."
@@ -180,7 +180,7 @@ def _outputs(view: View, start: Mapping[str, tuple[float, float]]) -> Iterator[s
         if name in start and known.kind == "real":  # of others, few points show too little
             low, high = start[name]
             # Some points of the search space show whether it depends on these, but not how far it goes.
-            text += f"; probably {view.labelled(name, low, number(low, 5))} at t = 0" if low == high else ""
+            text += f"; probably {number(low, 5)} at t = 0" if low == high else ""
         yield f"{text}{_in_files(view, name)}"
     yield _LEGEND.format(end=f" up to {horizon} s" if (horizon := _horizon(view)) else "")
 
