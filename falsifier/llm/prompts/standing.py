@@ -61,7 +61,7 @@ _TOGETHER = (
     "What must not happen is a conjunction: the requirement is violated only if all its parts hold at one "
     "time, from which a part with a window looks ahead. Of their robustness values there the smallest counts."
 )
-_UNTIL = "An until fails where its left side fails before its right side holds, or its right side never holds."
+_UNTIL = "An until fails where its left side fails before its right side holds, or where that never holds."
 _RECURRENCE = (
     "The requirement is violated if {condition} stays false for {length} s in one piece between t = {start} "
     "and {end} s."
