@@ -28,7 +28,7 @@ from falsifier.core.candidate import Candidate
 from falsifier.core.files import check_seal, remove_partial
 from falsifier.core.literals import one_line, shell_word
 from falsifier.core.words import counted
-from falsifier.errors import JournalError, SpecError, written
+from falsifier.errors import JournalError, written
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.record import files, manifest
 from falsifier.record.records import (
@@ -84,7 +84,7 @@ class Journal:
                     AskedRecord(
                         first=event.first,
                         n=event.wanted,
-                        candidates=[c.to_json() for c in event.candidates],
+                        candidates=list(event.candidates),
                         seconds=event.seconds,
                         requirement=event.problem.name,
                         elapsed=event.spent.seconds,
@@ -282,7 +282,7 @@ class JournalReader:
                     check_seal(line)
                     record = parse_line(line, number, self.run)
                     self._count(record)
-                except (ValueError, SpecError) as error:
+                except ValueError as error:
                     raise JournalError(
                         f"{self.path}: line {number} is damaged: {error}; to drop what is damaged: "
                         f"falsifier tools repair {shell_word(self.path.parent)}"
@@ -291,13 +291,10 @@ class JournalReader:
                 yield record
 
     def _count(self, record: Record) -> None:
-        """Count what a record is about; ValueError if what it follows from was not recorded before it.
-
-        SpecError if a candidate is none.
-        """
+        """Count what a record is about; ValueError if what it follows from was not recorded before it."""
         match record:
             case AskedRecord() if record.first == self._asked:
-                self._asked += len([*map(Candidate.from_json, record.candidates)])
+                self._asked += len(record.candidates)
             case EvaluatedRecord() if record.index == self._evaluated < self._asked:
                 self._evaluated += 1
             case ConfirmedRecord() if not 0 <= record.index < self._evaluated:
@@ -309,7 +306,7 @@ class JournalReader:
 def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:
     """Recorded candidates by the index of their evaluation."""
     return {
-        record.first + i: Candidate.from_json(candidate)
+        record.first + i: candidate
         for record in records
         if isinstance(record, AskedRecord)
         for i, candidate in enumerate(record.candidates)

@@ -45,8 +45,7 @@ def iterations(records: Iterable[Record], requirement: str) -> list[Iteration]:
         elif isinstance(record, AskedRecord):
             if record.requirement == requirement:
                 samples = [
-                    Sample(i, Candidate.from_json(c), told.get(i, ""))
-                    for i, c in enumerate(record.candidates, start=record.first)
+                    Sample(i, c, told.get(i, "")) for i, c in enumerate(record.candidates, start=record.first)
                 ]
                 found.append(Iteration(tuple(asked), tuple(samples)))
             asked = []

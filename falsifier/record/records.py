@@ -2,12 +2,12 @@
 
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, PlainSerializer, PlainValidator, TypeAdapter, ValidationError
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.files import seal
 from falsifier.core.strict import Strict
-from falsifier.errors import first_fault
+from falsifier.errors import SpecError, first_fault
 from falsifier.evaluation.confirm import Confirmation, Outcome
 from falsifier.evaluation.evaluate import Evaluation, Status
 from falsifier.llm.messages import Exchange
@@ -19,6 +19,20 @@ from falsifier.search.result import ResultStatus
 from falsifier.stl.monitor import Verdict
 
 _ELAPSED = Field(description="Wall-clock time of the run in s when the line was written.")
+
+
+def _candidate(recorded: Candidate | dict[str, Any]) -> Candidate:
+    try:
+        return recorded if isinstance(recorded, Candidate) else Candidate.from_json(recorded)
+    except SpecError as error:
+        raise ValueError(str(error)) from None
+
+
+_RecordedCandidate = Annotated[
+    Candidate,
+    PlainValidator(_candidate, json_schema_input_type=dict[str, Any]),
+    PlainSerializer(Candidate.to_json, return_type=dict[str, Any]),
+]
 
 
 class _Record(Strict):
@@ -36,7 +50,7 @@ class AskedRecord(_Record):
     kind: Literal["asked"] = "asked"
     first: int
     n: int
-    candidates: list[dict[str, Any]]
+    candidates: list[_RecordedCandidate]
     seconds: float
     requirement: str = Field(description="Requirement whose engine was asked.")
     elapsed: float = _ELAPSED

@@ -48,7 +48,7 @@ class ReplayedSteps(Steps):
             return super().ask(problem, engine, wanted)
         # The recorded number: near the end of the budget the first run asked for fewer than a full batch.
         candidates = proposals(engine, problem.space, record.n)
-        if [c.key for c in candidates] != [Candidate.from_json(c).key for c in record.candidates]:
+        if [c.key for c in candidates] != [c.key for c in record.candidates]:
             raise JournalError(
                 f"cannot resume: candidate {record.first} of the engine {engine.name!r} differs from the "
                 "journal, which was written with other settings, another version, or an engine that does not "

@@ -79,7 +79,7 @@ def test_what_is_wrong_with_a_value_of_a_record_is_said_with_its_key(tmp_path: P
         ({"seconds": "x"}, r"asked\.seconds: expected a number, got 'x'"),
         (
             {"candidates": [{"signals": {"u": {"times": [0]}}}]},
-            r"signals\.u: expected times, values and inter",
+            r"asked\.candidates, entry 1: signals\.u: expected times, values and inter",
         ),
     ):
         content = asked(0, 1).model_dump(exclude={"sum"}) | {"line": 1} | wrong

@@ -262,10 +262,9 @@ def _rarer(trajectory: Trajectory, margin: Array, clock: int) -> str:
 
 def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
     """What the predicates compare: terms such as ``y5 - y4``, and outputs that stand alone."""
-    sides = {str(side): side for p in view.requirement.formula.predicates for side in p.sides}
     columns = {
         text: np.broadcast_to(side.evaluate(trajectory.columns), trajectory.times.shape)
-        for text, side in sides.items()
+        for text, side in _sides(view).items()
         if set(side.signals) & set(view.formula_outputs)
     }
     return {text: column for text, column in columns.items() if np.isfinite(column).all()}
@@ -279,10 +278,15 @@ def _shown_columns(view: View, trajectory: Trajectory, compared: dict[str, Array
     """
     found = {n: trajectory[n] for n in view.recorded if view.space.inputs and n in trajectory.columns}
     others = [n for n, c in found.items() if n not in compared and not view.is_discrete(n, c)]
-    sides = {str(side): side for p in view.requirement.formula.predicates for side in p.sides}
+    sides = _sides(view)
     compared = {text: c for text, c in compared.items() if not _is_folded(sides[text], others)}
     columns = compared | {n: found[n] for n in others[: max(0, _MAX_SIGNALS - len(compared))]}
     return {text: column for text, column in columns.items() if np.isfinite(column).all()}
+
+
+def _sides(view: View) -> dict[str, Expression]:
+    """What the predicates compare, by its text."""
+    return {str(side): side for p in view.requirement.formula.predicates for side in p.sides}
 
 
 def _is_folded(side: Expression, told: Collection[str]) -> bool:

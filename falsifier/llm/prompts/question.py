@@ -282,7 +282,7 @@ class Questions:
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         trajectory = evaluation.trajectory
         progress = SampleProgress.of(self._view, trajectory) if trajectory else SampleProgress()
-        is_first = self._reached.is_new(progress)
+        has_new = self._reached.is_new(progress)
         switches = self._reached.switches(progress, trajectory, fine_clock(self._view)) if trajectory else ""
         news = self._reached.news(progress)
         self._climb.add(self._told, verdict, trajectory, self._view.requirement.formula.predicates)
@@ -296,11 +296,11 @@ class Questions:
         brief = inputs if why else as_signals(self._view, candidate, in_brief=True)
         texts = (
             _text(inputs, *head, changes, *found.full),
-            _text(inputs, *head, changes if is_first else "", *found.short),
+            _text(inputs, *head, changes if has_new else "", *found.short),
             _text(brief, *head, found.line),
         )
         best = min((s.robustness for s in self._judged if s.robustness is not None), default=None)
-        is_first = is_first or bool(news)
+        is_first = has_new or bool(news)
         depth = _FULL if is_first or best is None or verdict.robustness < best else _SHORT
         tokens = tuple(map(self._count, texts))
         return _Sample(

@@ -58,7 +58,7 @@ class _Watched:
     """One run directory, and what was read of it so far."""
 
     run: RunFollower[Run]
-    candidates: dict[int, dict[str, Any]] = field(default_factory=dict)
+    candidates: dict[int, Candidate] = field(default_factory=dict)
     exchange: Exchange | None = None
     _every: int = 1
 
@@ -165,9 +165,9 @@ def _choice(places: Collection[str], rows: Sequence[RunProgress]) -> Html:
 def _run_html(run: Run, watched: _Watched) -> Html:
     """One requirement of a run: the card of the report, then how the search goes."""
     best = None if run.shown is None else watched.candidates.get(run.shown)
-    shown = [] if best is None else [shown_of(run, Candidate.from_json(best))]
+    shown = [] if best is None else [shown_of(run, best)]
     count = len(run.robustness)
-    tried = [(Candidate.from_json(c), None) for i, c in sorted(watched.candidates.items()) if i < count]
+    tried = [(c, None) for i, c in sorted(watched.candidates.items()) if i < count]
     history = drawn(partial(plot_history, run), "Robustness over simulations")
     covered = drawn(lambda: plot_coverage(coverage_of(run.manifest, tried)), "What was tried")
     facts = [("time", seconds_text(run.spent))]
