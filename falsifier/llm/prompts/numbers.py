@@ -66,6 +66,11 @@ def coarse_clock(stop_time: float) -> int:
     return decimals_for(stop_time / 2, 3)
 
 
+def fine_clock(view: View) -> int:
+    """Decimals of times: enough for the output grid, because all times shown are sample times."""
+    return max(decimals_for(view.space.stop_time, 4), decimals_for(view.experiment.output_interval, 1))
+
+
 def plain(value: float, decimals: int) -> str:
     """Number with at most that many decimals, without trailing zeros; a tiny or huge one with an exponent.
 

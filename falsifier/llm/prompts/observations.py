@@ -14,7 +14,7 @@ from falsifier.core.words import in_unit, listed
 from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts import courses
 from falsifier.llm.prompts.courses import Array
-from falsifier.llm.prompts.numbers import coarse_clock, column_decimals, decimals_for, number, plain
+from falsifier.llm.prompts.numbers import coarse_clock, column_decimals, fine_clock, number, plain
 from falsifier.llm.prompts.together import Side, asked_for, longest_failure, near_misses
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Verdict
@@ -99,8 +99,9 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
         predicates.append(f"at the end of the longest failure in one piece, {values}")
     inside = view.inside(trajectory)
     discrete = tuple(_discrete(view, inside))
-    continuous = (*_continuous(view, evaluation, inside), *_close_up(view, inside, evaluation))
-    few_courses = _continuous(view, evaluation, inside, of=_deciding(view, verdict))
+    deciding = _deciding(view, verdict, inside)
+    continuous = (*_continuous(view, evaluation, inside), *_close_up(view, evaluation, inside, deciding))
+    few_courses = (f"{n}: {_drawn(view, n, inside, c, (), _FEWER_BREAKPOINTS)}" for n, c in deciding.items())
     return Observed(
         (*reasons, *there, *parts, *discrete, *predicates, *continuous),
         (*reasons, *parts, *discrete, *predicates, *few_courses),
@@ -128,28 +129,20 @@ def _reasons(verdict: Verdict, diagnosis: Diagnosis, *, is_timed: bool) -> Itera
 
 def _discrete(view: View, inside: Trajectory) -> Iterator[str]:
     """Changes of all discrete signals, and stays of those in the formula."""
-    for name in view.recorded:
-        if name not in inside.columns or not view.is_discrete(name, inside[name]):
-            continue
+    for name, column in view.discrete(inside).items():
         clock, label = fine_clock(view), partial(view.labelled, name)
-        yield f"{name}: {courses.change_list(inside.times, inside[name], clock=clock, label=label)}"
-        stays = courses.dwell_list(inside.times, inside[name], clock=clock, label=label)
+        yield f"{name}: {courses.change_list(inside.times, column, clock=clock, label=label)}"
+        stays = courses.dwell_list(inside.times, column, clock=clock, label=label)
         if name in view.formula_outputs and stays:
             yield f"{name} stays: {stays}"
 
 
-def _continuous(
-    view: View, evaluation: Evaluation, inside: Trajectory, *, of: set[str] | None = None
-) -> Iterator[str]:
-    """Courses of what is compared and of other signals; or of these terms only, in fewer points."""
-    compared = compared_columns(view, inside)
-    columns = _shown_columns(view, inside, compared) if of is None else compared
-    steps = _input_steps(view, evaluation) if of is None else ()
-    for name, column in columns.items():
-        if (of is not None and name not in of) or view.is_discrete(name, column):
-            continue
+def _continuous(view: View, evaluation: Evaluation, inside: Trajectory) -> Iterator[str]:
+    """Courses of what is compared and of other signals."""
+    steps = _input_steps(view, evaluation)
+    for name, column in _shown_columns(view, inside).items():
         is_judged = _is_judged(view, name)
-        most = courses.MOST_BREAKPOINTS if of is None and is_judged else _FEWER_BREAKPOINTS
+        most = courses.MOST_BREAKPOINTS if is_judged else _FEWER_BREAKPOINTS
         yield f"{name}: {_drawn(view, name, inside, column, steps if is_judged else (), most)}"
 
 
@@ -219,13 +212,8 @@ def _predicates(
     discrete signal whose changes are all listed.
     """
     clock = fine_clock(view)
-    in_full = {
-        name
-        for name in view.recorded
-        if name in trajectory.columns
-        and view.is_discrete(name, trajectory[name])
-        and np.count_nonzero(np.diff(trajectory[name])) <= courses.SHOWN_CHANGES
-    }
+    discrete = view.discrete(trajectory).items()
+    in_full = {n for n, c in discrete if np.count_nonzero(np.diff(c)) <= courses.SHOWN_CHANGES}
     for predicate in view.requirement.formula.predicates:
         if len(predicate.signals) == 1 and in_full.issuperset(predicate.signals):
             continue
@@ -270,18 +258,18 @@ def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
     return {text: column for text, column in columns.items() if np.isfinite(column).all()}
 
 
-def _shown_columns(view: View, trajectory: Trajectory, compared: dict[str, Array]) -> dict[str, Array]:
-    """What is compared, then recorded signals that are not discrete; none if there are no input signals.
+def _shown_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
+    """What is compared and other recorded signals, unless discrete; no others if there are no input signals.
 
     Parameters act at the start alone, so that the course of everything else decides nothing. Nor is the
     absolute value of a signal told beside the signal.
     """
+    compared, sides = compared_columns(view, trajectory), _sides(view)
     found = {n: trajectory[n] for n in view.recorded if view.space.inputs and n in trajectory.columns}
     others = [n for n, c in found.items() if n not in compared and not view.is_discrete(n, c)]
-    sides = _sides(view)
     compared = {text: c for text, c in compared.items() if not _is_folded(sides[text], others)}
     columns = compared | {n: found[n] for n in others[: max(0, _MAX_SIGNALS - len(compared))]}
-    return {text: column for text, column in columns.items() if np.isfinite(column).all()}
+    return {n: c for n, c in columns.items() if np.isfinite(c).all() and not view.is_discrete(n, c)}
 
 
 def _sides(view: View) -> dict[str, Expression]:
@@ -324,13 +312,13 @@ def _drawn(
     )
 
 
-def _close_up(view: View, inside: Trajectory, evaluation: Evaluation) -> Iterator[str]:
+def _close_up(
+    view: View, evaluation: Evaluation, inside: Trajectory, deciding: Mapping[str, Array]
+) -> Iterator[str]:
     """What the deciding predicate compares, more exactly around the critical time."""
     verdict = evaluation.verdict
     assert verdict is not None
-    for name, column in compared_columns(view, inside).items():
-        if name not in _deciding(view, verdict) or view.is_discrete(name, column):
-            continue
+    for name, column in deciding.items():
         near = close_up_times(view, inside.times, column, evaluation)
         part = column[near]
         if np.ptp(part) <= _AT_REST * abs(verdict.robustness):
@@ -370,11 +358,13 @@ def _input_steps(view: View, evaluation: Evaluation) -> tuple[float, ...]:
     return tuple(found) if len(found) <= _MOST_STEPS else ()
 
 
-def _deciding(view: View, verdict: Verdict) -> set[str]:
-    """What the deciding predicate compares."""
-    formula = view.requirement.formula
-    deciding = [p for p in formula.predicates if str(p) == verdict.predicate] or list(formula.predicates)
-    return {str(side) for p in deciding for side in p.sides}
+def _deciding(view: View, verdict: Verdict, inside: Trajectory) -> dict[str, Array]:
+    """What the deciding predicate compares, unless it is discrete."""
+    predicates = view.requirement.formula.predicates
+    deciding = [p for p in predicates if str(p) == verdict.predicate] or predicates
+    sides = {str(side) for p in deciding for side in p.sides}
+    compared = compared_columns(view, inside).items()
+    return {text: c for text, c in compared if text in sides and not view.is_discrete(text, c)}
 
 
 def _decimals(view: View, column: Array, name: str, robustness: float) -> int:
@@ -385,8 +375,3 @@ def _decimals(view: View, column: Array, name: str, robustness: float) -> int:
 def _is_judged(view: View, name: str) -> bool:
     """Whether the formula names a signal; what is compared and is no signal is a term of the formula."""
     return name in view.requirement.formula.signals or name not in view.info
-
-
-def fine_clock(view: View) -> int:
-    """Decimals of times: enough for the output grid, because all times shown are sample times."""
-    return max(decimals_for(view.space.stop_time, 4), decimals_for(view.experiment.output_interval, 1))

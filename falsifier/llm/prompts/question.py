@@ -20,7 +20,7 @@ from falsifier.llm.messages import Message
 from falsifier.llm.prompts import published
 from falsifier.llm.prompts.advice import on_first, on_next
 from falsifier.llm.prompts.numbers import as_signals, number
-from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, fine_clock, observed
+from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.standing import formula_text, standing
 from falsifier.llm.prompts.together import recurring
@@ -282,8 +282,8 @@ class Questions:
             return _Sample(self._told, (text,) * 3, (self._count(text),) * 3, _LINE, None)
         trajectory = evaluation.trajectory
         progress = SampleProgress.of(self._view, trajectory) if trajectory else SampleProgress()
-        has_new = self._reached.is_new(progress)
-        switches = self._reached.switches(progress, trajectory, fine_clock(self._view)) if trajectory else ""
+        has_new = bool(self._reached.new_changes(progress))
+        switches = self._reached.switches(progress, trajectory) if trajectory else ""
         news = self._reached.news(progress)
         self._climb.add(self._told, verdict, trajectory, self._view.requirement.formula.predicates)
         found = observed(self._view, evaluation)

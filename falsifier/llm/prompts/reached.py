@@ -10,7 +10,7 @@ import numpy as np
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import resolving
-from falsifier.llm.prompts.numbers import column_decimals, number, plain
+from falsifier.llm.prompts.numbers import column_decimals, fine_clock, number, plain
 from falsifier.llm.prompts.view import View
 
 # A value or a change of a discrete signal: its name, the value before, the value.
@@ -85,38 +85,35 @@ class Reached:
             self._ranges[name] = (min(low, least), max(high, most))
         return (*found[:_MOST_NEW], *(["..."] if len(found) > _MOST_NEW else []))
 
-    def is_new(self, progress: SampleProgress) -> bool:
-        """Whether a discrete signal made a change that it made in no earlier sample."""
-        return any(c not in self._stages for changes in progress.changes.values() for c in changes)
+    def new_changes(self, progress: SampleProgress) -> list[Stage]:
+        """Changes of discrete signals that no earlier sample made."""
+        return [c for found in progress.changes.values() for c in found if c not in self._stages]
 
-    def switches(self, progress: SampleProgress, trajectory: Trajectory, clock: int) -> str:
+    def switches(self, progress: SampleProgress, trajectory: Trajectory) -> str:
         """When discrete signals changed, and other signals at that time.
 
         Told are changes that no earlier sample made, those of the requirement's signals before others; then
-        others of the requirement's signals. It is to be called before the sample is added; ``clock`` is the
-        number of decimals of times.
+        others of the requirement's signals. It is to be called before the sample is added.
         """
-        judged = self._view.formula_outputs
-        changes = [c for found in progress.changes.values() for c in found]
-        few = self._few([c for c in changes if c not in self._stages], but_all_of=judged)
+        judged, new = self._view.formula_outputs, self.new_changes(progress)
+        few = self._few(new, but_all_of=judged)
 
         def urgency(k: int) -> tuple[int, int]:
-            new = [c[0] in judged for c in progress.changes.get(k, ()) if c in few]
-            known = any(c[0] in judged for c in progress.changes.get(k, ()))
-            return (0 if any(new) else 1 if new else 2 if known else 3), k
+            found = progress.changes.get(k, ())
+            told = [c[0] in judged for c in found if c in few]
+            known = any(c[0] in judged for c in found)
+            return (0 if any(told) else 1 if told else 2 if known else 3), k
 
         times = {k for k, found in progress.changes.items() if any(c in few for c in found)} | progress.again
         told = sorted(sorted(times, key=urgency)[:_MOST_SWITCHES])
         inputs = [r.name for r in self._view.space.inputs if r.name in trajectory.columns]
         names = [*list(progress.ranges)[:_MOST_BESIDE], *(inputs if len(inputs) <= _MOST_BESIDE else ())]
-        texts = (self._change(progress, trajectory, names, k, clock) for k in told)
-        new = {k for k, found in progress.changes.items() if any(c not in self._stages for c in found)}
-        is_all = new | progress.again <= set(told)
+        texts = (self._change(progress, trajectory, names, k) for k in told)
+        known = {c for k in told for c in progress.changes.get(k, ())}
+        is_all = known.issuperset(new) and progress.again <= set(told)
         return "; ".join((*texts, *([] if is_all else ["..."])))
 
-    def _change(
-        self, progress: SampleProgress, trajectory: Trajectory, names: Sequence[str], k: int, clock: int
-    ) -> str:
+    def _change(self, progress: SampleProgress, trajectory: Trajectory, names: Sequence[str], k: int) -> str:
         columns = trajectory.columns
         discrete = {name for name, _, _ in progress.stages}
         beside = (
@@ -128,7 +125,7 @@ class Reached:
             for n in self._view.recorded
             if n in discrete and columns[n][k - 1] != columns[n][k]
         )
-        words = f"{', '.join(together)} at {plain(trajectory.times[k], clock)} s"
+        words = f"{', '.join(together)} at {plain(trajectory.times[k], fine_clock(self._view))} s"
         return f"{words} ({', '.join(beside)})" if names else words
 
     @property

@@ -50,6 +50,11 @@ class View:
         """Whether a signal is told by its changes; the column, shape (n,), decides if it is of type real."""
         return is_discrete(column, kind=self.variable(name).kind)
 
+    def discrete(self, trajectory: Trajectory) -> dict[str, NDArray[np.float64]]:
+        """Columns of the recorded signals that are told by their changes."""
+        columns = {name: trajectory[name] for name in self.recorded if name in trajectory.columns}
+        return {name: column for name, column in columns.items() if self.is_discrete(name, column)}
+
     def labelled(self, name: str, value: float, text: str) -> str:
         """A value's text, with the name of its item if it has one."""
         literals = self.variable(name).literals

@@ -236,7 +236,7 @@ def test_of_a_counter_that_rises_far_its_first_values_and_the_last_are_told() ->
     ):
         trajectory = Trajectory(times, {"x": np.minimum(times // 1, top), "u": 0 * times})
         progress = SampleProgress.of(view, trajectory)
-        told = reached.switches(progress, trajectory, 0)
+        told = reached.switches(progress, trajectory)
         assert re.sub(r" \(.*?\)", "", told) == changes
         assert reached.news(progress) == values
 
@@ -298,7 +298,7 @@ def test_all_changes_of_a_moment_are_told_if_one_of_them_is_new() -> None:
     for n in (np.zeros_like(times), switched):
         trajectory = Trajectory(times, {"x": switched, "n": n})
         progress = SampleProgress.of(view, trajectory)
-        told.append(reached.switches(progress, trajectory, 0))
+        told.append(reached.switches(progress, trajectory))
         reached.news(progress)
     assert told == ["x 0 -> 1 at 4 s", "x 0 -> 1, n 0 -> 1 at 4 s"]
 
