@@ -112,9 +112,8 @@ class Disguise:
     def _range(self, r: Ranged) -> Ranged:
         """What may be chosen, in neutral words."""
         kind: ValueKind = "real" if r.kind == "real" else "integer"
-        numbers = sorted(n for _, n in r.items if r.low <= n <= r.high)
-        has_gaps = bool(numbers) and numbers[-1] - numbers[0] >= len(numbers)
-        items = tuple((str(n), n) for n in numbers) if has_gaps else ()
+        has_gaps = bool(r.items) and r.high - r.low >= len(r.numbers)
+        items = tuple((str(n), n) for n in r.numbers) if has_gaps else ()
         return replace(r, name=self.names[r.name], unit="", description="", kind=kind, items=items)
 
     def _kind(self, name: str) -> Kind:

@@ -252,7 +252,7 @@ def compared_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
     """What the predicates compare: terms such as ``y5 - y4``, and outputs that stand alone."""
     columns = {
         text: np.broadcast_to(side.evaluate(trajectory.columns), trajectory.times.shape)
-        for text, side in _sides(view).items()
+        for text, side in view.compared.items()
         if set(side.signals) & set(view.formula_outputs)
     }
     return {text: column for text, column in columns.items() if np.isfinite(column).all()}
@@ -264,17 +264,12 @@ def _shown_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
     Parameters act at the start alone, so that the course of everything else decides nothing. Nor is the
     absolute value of a signal told beside the signal.
     """
-    compared, sides = compared_columns(view, trajectory), _sides(view)
+    compared = compared_columns(view, trajectory)
     found = {n: trajectory[n] for n in view.recorded if view.space.inputs and n in trajectory.columns}
     others = [n for n, c in found.items() if n not in compared and not view.is_discrete(n, c)]
-    compared = {text: c for text, c in compared.items() if not _is_folded(sides[text], others)}
+    compared = {text: c for text, c in compared.items() if not _is_folded(view.compared[text], others)}
     columns = compared | {n: found[n] for n in others[: max(0, _MAX_SIGNALS - len(compared))]}
     return {n: c for n, c in columns.items() if np.isfinite(c).all() and not view.is_discrete(n, c)}
-
-
-def _sides(view: View) -> dict[str, Expression]:
-    """What the predicates compare, by its text."""
-    return {str(side): side for p in view.requirement.formula.predicates for side in p.sides}
 
 
 def _is_folded(side: Expression, told: Collection[str]) -> bool:

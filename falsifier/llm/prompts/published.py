@@ -148,10 +148,9 @@ def _told_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
 
     The published models have outputs for such terms.
     """
-    sides = {str(side): side for p in view.requirement.formula.predicates for side in p.sides}
     columns: dict[str, Array] = {}
     for text, column in compared_columns(view, trajectory).items():
-        names = sides[text].signals
+        names = view.compared[text].signals
         columns |= {text: column} if len(names) > 1 else {name: trajectory[name] for name in names}
     return columns
 

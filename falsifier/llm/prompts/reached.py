@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import fsum, inf
+from operator import itemgetter
 
 import numpy as np
 
@@ -71,13 +72,9 @@ class Reached:
 
     def news(self, progress: SampleProgress) -> tuple[str, ...]:
         """Add a sample; return the values that no earlier one reached, in words; of the first one nothing."""
-        values = sorted(
-            (name, value)
-            for name, before, value in progress.stages - self._stages.keys()
-            if before is None and not self._passed(name, value)
-        )
+        values = (s for s in progress.stages - self._stages.keys() if s[1] is None and not self._passed(s))
+        new = self._few(sorted(values, key=itemgetter(0, 2)))
         is_begun = self._stages or self._ranges
-        new = self._few([(name, None, value) for name, value in values])
         found = [*map(self._stage, new), *self._further(progress)] if is_begun else []
         self._stages.update(progress.stages)
         for name, (low, high) in progress.ranges.items():
@@ -168,8 +165,9 @@ class Reached:
     def _value(self, name: str, value: float) -> str:
         return self._view.labelled(name, value, plain(value, 6))
 
-    def _passed(self, name: str, value: float) -> bool:
+    def _passed(self, stage: Stage) -> bool:
         """Whether a signal that was not discrete in an earlier sample had this value there."""
+        name, _, value = stage
         least, most = self._ranges.get(name, (inf, -inf))
         return least <= value <= most
 

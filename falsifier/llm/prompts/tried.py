@@ -1,12 +1,11 @@
 """Which values of what is chosen the samples have tried; told where the robustness gives no direction."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.ranges import InputRange, ParameterRange
+from falsifier.core.ranges import Range
 from falsifier.llm.prompts.numbers import bounds
 from falsifier.llm.prompts.view import View
 
@@ -38,10 +37,10 @@ class Tried:
         """What no sample tried; empty if they tried about all."""
         return "; ".join(gap for r in self.view.space.ranges if (gap := self._gap(r)))
 
-    def _gap(self, r: InputRange | ParameterRange) -> str:
+    def _gap(self, r: Range) -> str:
         tried = sorted(self._values.get(r.name, ()))
         if r.kind != "real" and r.high - r.low < _VALUES:
-            left = [str(n) for n in self._possible(r) if n not in tried]
+            left = [str(n) for n in r.numbers if n not in tried]
             listed = ", ".join((*left[:_MOST_LISTED], *(["..."] if len(left) > _MOST_LISTED else [])))
             return f"{r.name} = {listed}" if left else ""
         edges = [r.low, *tried, r.high]
@@ -56,7 +55,3 @@ class Tried:
             else:
                 told.append(f"between {low} and {high}")
         return f"{r.name} {', '.join(told)}" if told else ""
-
-    def _possible(self, r: InputRange | ParameterRange) -> Iterator[int]:
-        named = [n for _, n in r.items]
-        yield from (n for n in named or range(round(r.low), round(r.high) + 1) if r.low <= n <= r.high)

@@ -20,6 +20,7 @@ from falsifier.errors import SpecError, did_you_mean
 from falsifier.llm import CONTEXT_VARIANT, DEFAULT_VARIANT
 from falsifier.problem.problem import Problem
 from falsifier.problem.requirement import Requirement
+from falsifier.stl.expression import Expression
 from falsifier.stl.formula import Temporal
 
 # What the lines on signals that nobody asked for may have in bytes, and what each has besides its name and
@@ -85,6 +86,11 @@ class View:
         """Signals of the formula that are not searched themselves, in order of appearance."""
         signals, searched = self.requirement.formula.signals, self.space.names
         return tuple(n for n in signals if n not in searched or n in self.info.starts)
+
+    @property
+    def compared(self) -> dict[str, Expression]:
+        """What the predicates compare, by its text."""
+        return {str(side): side for p in self.requirement.formula.predicates for side in p.sides}
 
     @property
     def recorded(self) -> tuple[str, ...]:
