@@ -87,11 +87,11 @@ def told_courses(view: View, evaluation: Evaluation) -> Iterator[Told]:
         for name, column in columns.items():
             if line.startswith(f"{name}: ") and ", then " in line:
                 yield _changes(name, line[len(name) + 2 :], inside.times, column)
-            elif line.startswith(f"{name}: ") and ":" in line[len(name) + 2 :]:
+            elif line.startswith(f"{name}: ") and ":" in line[len(name) + 2 :] and "irregular, " not in line:
                 clock = coarse_clock(view.space.stop_time)
                 stated = told_accuracy(view, name, column)
                 yield _compared(name, line[len(name) + 2 :], inside.times, column, stated, clock)
-            if line.startswith(f"{name} around t = ") and ": least " not in line:
+            if line.startswith(f"{name} around t = ") and "irregular, " not in line:
                 part = close_up_times(view, inside.times, column, evaluation)
                 times, column = inside.times[part], column[part]
                 stated = CLOSE_TOLERANCE * float(np.ptp(column))

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 Points = tuple[tuple[float, float, float], ...]
 
 # Changes listed individually; of longer lists the beginning and the end.
-SHOWN_CHANGES = 16
+SHOWN_CHANGES = 24
 # So many changes by the same amount, after the same time, are told together.
 _REGULAR = 4
 # Breakpoints of one signal; a signal that needs more is told less exactly, and how exactly.
@@ -169,7 +169,8 @@ def course(
     ``clock`` is the number of decimals of times, ``tolerance`` the distance from the signal that is wanted,
     in its own unit, one number or one per time. Oscillations with at least the period ``slower_than`` are
     told point by point, if points suffice. What is less exact than ``claimed``, by default the largest
-    distance that is wanted, says so; beyond the share ``coarsest`` of the span, only extremes are told.
+    distance that is wanted, says so; beyond the share ``coarsest`` of the span, values at
+    some times and the extremes are told.
     ``most`` limits the breakpoints beside those at the times ``kept``.
     """
     allowed = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), times.shape)
@@ -221,7 +222,8 @@ def course(
         for word, k in ends
     )
     if off > coarsest * float(np.ptp(column)):
-        return f"{extremes}, and too irregular in between to be told"
+        spread = np.unique(np.linspace(0, len(times) - 1, most).round().astype(int)).tolist()
+        return f"irregular, at times {_pairs(_points(times, column, allowed, spread), clock)} ({extremes})"
     return f"{text} ({within}; {extremes})"
 
 

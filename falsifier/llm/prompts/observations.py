@@ -43,8 +43,8 @@ _CLOSE_PERIODS = 2.5
 CLOSE_TOLERANCE = 0.01
 # What changes by no more than this share of the robustness in that interval is not told there.
 _AT_REST = 0.01
-# Breakpoints of signals that the formula does not compare, and of samples that are told in short.
-_FEWER_BREAKPOINTS = 16
+# Breakpoints of signals that the formula does not compare, and of those of samples that are told in short.
+_BREAKPOINTS_OF_OTHERS, _FEWER_BREAKPOINTS = 24, 16
 # Steps of an input at which the course of an output always has a breakpoint, so that its response is seen.
 _MOST_STEPS = 8
 _SIDES: Mapping[type[Formula], str] = {
@@ -142,7 +142,7 @@ def _continuous(view: View, evaluation: Evaluation, inside: Trajectory) -> Itera
     steps = _input_steps(view, evaluation)
     for name, column in _shown_columns(view, inside).items():
         is_judged = _is_judged(view, name)
-        most = courses.MOST_BREAKPOINTS if is_judged else _FEWER_BREAKPOINTS
+        most = courses.MOST_BREAKPOINTS if is_judged else _BREAKPOINTS_OF_OTHERS
         yield f"{name}: {_drawn(view, name, inside, column, steps if is_judged else (), most)}"
 
 

@@ -31,7 +31,7 @@ def test_change_list() -> None:
     told = "1, then 2 from 1.6 s, 3 from 4.36 s, 2 from 5 s, 1 from 5.25 s, 4 from 7 s"
     assert change_list(TIMES, GEAR, clock=2) == told
     assert change_list(TIMES, np.full_like(TIMES, 3.0), clock=2) == "constant 3"
-    for count, left_out in ((16, []), (17, ["2 more changes"])):
+    for count, left_out in ((24, []), (25, ["2 more changes"])):
         squares = np.minimum(np.sqrt(np.arange(1001)) // 1, count)
         changes = change_list(TIMES, squares, clock=2).split(", ")
         assert [each for each in changes if "more" in each] == left_out
@@ -41,7 +41,7 @@ def test_change_list() -> None:
     uneven = steps((0, 0), (1, 1), (3, 2), (4, 3), (6, 4), (7, 5), (9, 6))
     assert "every" not in change_list(TIMES * 1e-9, uneven, clock=10), "however short the times are"
     long = change_list(TIMES, (np.arange(1001) // 10 % 2).astype(np.float64), clock=2)
-    assert long.startswith("0, then 1 from 0.1 s") and "85 more changes" in long and long.endswith("10 s")
+    assert long.startswith("0, then 1 from 0.1 s") and "77 more changes" in long and long.endswith("10 s")
 
 
 def test_dwell_list_names_the_shortest_stay() -> None:
@@ -83,11 +83,15 @@ def test_a_course_that_needs_more_points_says_how_exact_it_is() -> None:
     assert claimed < error <= float(within) <= 2 * error
 
 
-def test_of_what_is_too_irregular_only_the_extremes_are_told() -> None:
+def test_of_what_is_too_irregular_points_and_extremes_are_told() -> None:
     wild = np.random.default_rng(0).uniform(-1, 1, len(TIMES))
     wild[[300, 700]] = -2.0, 3.0
-    told = course(TIMES, wild, clock=2, tolerance=0.1, slower_than=0.0, most=6, coarsest=0.3)
-    assert told == "least -2 at 3 s, greatest 3 at 7 s, and too irregular in between to be told"
+    told = course(TIMES, wild, clock=2, tolerance=0.1, slower_than=0.5, most=6, coarsest=0.3)
+    begin, end = "irregular, at times ", " (least -2 at 3 s, greatest 3 at 7 s)"
+    assert told.startswith(begin) and told.endswith(end)
+    times, values = drawn_points(told.removeprefix(begin).removesuffix(end))
+    assert times == [0, 2, 4, 6, 8, 10]
+    assert values == pytest.approx(wild[[0, 200, 400, 600, 800, 1000]], abs=0.1)
 
 
 def test_near_a_threshold_points_are_finer_once_the_rest_is_exact_enough() -> None:

@@ -168,7 +168,7 @@ def test_a_line_tells_the_margins_of_the_parts() -> None:
     assert told.line == "decided at t = 10 s by x <= 12; alternatives +2, -1"
 
 
-@pytest.mark.parametrize(("jumps", "is_told"), [(5, False), (20, True)])
+@pytest.mark.parametrize(("jumps", "is_told"), [(5, False), (30, True)])
 def test_when_a_discrete_signal_was_beyond_its_limit_is_told_unless_its_changes_show_it(
     jumps: int, *, is_told: bool
 ) -> None:
