@@ -22,6 +22,7 @@ from falsifier.llm.prompts.advice import on_first, on_next
 from falsifier.llm.prompts.numbers import as_signals, number
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
+from falsifier.llm.prompts.regularities import Regularities
 from falsifier.llm.prompts.standing import formula_text, standing
 from falsifier.llm.prompts.together import recurring
 from falsifier.llm.prompts.tried import Tried
@@ -96,6 +97,7 @@ class Questions:
         self._inputs: dict[str, int] = {}
         self._reached = Reached(view)
         self._tried = Tried(view)
+        self._regularities = Regularities(view)
         self._recurring = recurring(view.requirement.formula)
         self._climb = Climb(_counting(view), "sample")
 
@@ -119,6 +121,7 @@ class Questions:
                 for name in self._start.keys() & at_start.keys():
                     values = (*self._start[name], at_start[name])
                     self._start[name] = (min(values), max(values))
+                self._regularities.add(evaluation.trajectory)
             self._shorten()
 
     def ask(
@@ -204,6 +207,7 @@ class Questions:
             return
         if is_own and self._samples:
             yield from self._standings()
+            yield from filter(None, (self._regularities.text,))
         yield from notes
         if lessons and self._variant.has("lessons"):
             yield f"Your lessons so far: {lessons}"

@@ -23,8 +23,9 @@ _FURTHER = 0.05
 _MOST_NEW, _MOST_OF_ONE, _MOST_SWITCHES = 8, 3, 8
 # New changes of a signal of the requirement up to which it is a mode, and no counter.
 _MOST_OF_MODE = 6
-# Outputs and inputs that are told at each new change.
-_MOST_BESIDE = 6
+# Outputs and inputs that are told at each new change; what changed there by more than this share of its span
+# is told with its value before, too.
+_MOST_BESIDE, _JUMP = 6, 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +51,7 @@ class SampleProgress:
             if view.is_discrete(name, column):
                 begun = np.flatnonzero(np.diff(column, prepend=np.nan)).tolist()
                 stages |= {(name, None, value) for value in column[begun].tolist()}
-                if name in view.formula_outputs:
+                if name in view.formula_outputs or len(begun) <= _MOST_OF_MODE:
                     again.update(begun[1 : _MOST_SWITCHES + 2])
                 for before, k in pairwise(begun):
                     change = (name, float(column[before]), float(column[k]))
@@ -113,17 +114,22 @@ class Reached:
     def _change(self, progress: SampleProgress, trajectory: Trajectory, names: Sequence[str], k: int) -> str:
         columns = trajectory.columns
         discrete = {name for name, _, _ in progress.stages}
-        beside = (
-            f"{n} {self._view.labelled(n, float(c[k]), plain(float(c[k]), column_decimals(c)))}"
-            for n, c in ((n, columns[n]) for n in names)
-        )
+
+        def beside(name: str) -> str:
+            column = columns[name]
+            jumps = abs(column[k] - column[k - 1]) > _JUMP * np.ptp(column)
+            values = column[k - 1 : k + 1] if jumps else column[k : k + 1]
+            decimals = column_decimals(column)
+            told = (self._view.labelled(name, v, plain(v, decimals)) for v in values.tolist())
+            return f"{name} {' -> '.join(told)}"
+
         together = (
             self._stage((n, float(columns[n][k - 1]), float(columns[n][k])))
             for n in self._view.recorded
             if n in discrete and columns[n][k - 1] != columns[n][k]
         )
         words = f"{', '.join(together)} at {plain(trajectory.times[k], fine_clock(self._view))} s"
-        return f"{words} ({', '.join(beside)})" if names else words
+        return f"{words} ({', '.join(map(beside, names))})" if names else words
 
     @property
     def unmoved(self) -> str:
