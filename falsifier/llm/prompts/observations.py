@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from math import inf
 
@@ -15,7 +15,7 @@ from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts import courses
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import coarse_clock, column_decimals, fine_clock, number, plain
-from falsifier.llm.prompts.together import Side, asked_for, longest_failure, near_misses
+from falsifier.llm.prompts.together import Side, asked_for, closest, longest_failure, near_misses
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Verdict
 from falsifier.stl.diagnosis import links
@@ -67,6 +67,8 @@ class Observed:
     line: str
     is_timed: bool = False  # whether what decided changed over time, so that its time tells something
     failure: float = 0.0  # s for which what must recur failed in one piece; 0 if nothing must
+    # How far each of what must happen together was from it at best, below 0 if it did.
+    closest: Mapping[Side, float] = field(default_factory=dict)
 
 
 def observed(view: View, evaluation: Evaluation) -> Observed:
@@ -108,6 +110,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
         "; ".join((line, *(brief for _, brief in told_parts[:1]))),
         is_timed,
         failure[1] - failure[0] if failure else 0.0,
+        closest(view.requirement.formula, over_time),
     )
 
 

@@ -24,7 +24,7 @@ from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.regularities import Regularities
 from falsifier.llm.prompts.standing import formula_text, standing
-from falsifier.llm.prompts.together import recurring
+from falsifier.llm.prompts.together import Side, apart, recurring
 from falsifier.llm.prompts.tried import Tried
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.llm.usage import count_tokens
@@ -68,6 +68,7 @@ class _Sample:
     is_first: bool = False  # whether it was the first to reach something
     is_timed: bool = False  # whether the time that decided tells something
     failure: float = 0.0  # s for which what must recur failed in one piece
+    closest: Mapping[Side, float] = field(default_factory=dict)  # how far what must happen together was off
 
 
 class Questions:
@@ -240,6 +241,8 @@ class Questions:
             better = [s for s in ranked[:_NAMED] if s.robustness != ranked[-1].robustness]
             told = (f"{signed(s.robustness or 0.0, 3)} in sample {s.number}" for s in better)
             yield f"Lowest robustness so far: {', '.join(told)}."
+        if together := apart({s.number: s.closest for s in self._judged if s.closest}):
+            yield together
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
             yield "\n".join((*few, *self._climb.lines))
@@ -317,6 +320,7 @@ class Questions:
             is_first,
             found.is_timed,
             found.failure,
+            found.closest,
         )
 
     def _alike(self, inputs: str) -> str:

@@ -7,12 +7,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from falsifier.core.words import listed
 from falsifier.llm.prompts.courses import Array, longest_stretch
 from falsifier.stl import Formula
 from falsifier.stl.formula import Always, And, Eventually, Implies, Not, Or
+from falsifier.stl.margins import shown
 
 # Near misses that are told, by what was missing.
 _MOST_MISSES = 4
+# Samples that are listed as those in which one of what must happen together did.
+_MOST_NEAREST = 4
 
 
 class Side(NamedTuple):
@@ -73,6 +77,33 @@ def longest_failure(
     return None if found is None else longest_stretch(times, over_time[found.condition] < 0)
 
 
+def closest(formula: Formula, over_time: Mapping[Formula, Array]) -> dict[Side, float]:
+    """How far each of what must happen together was off at best, below 0 if it did; empty for one thing."""
+    inner = at_one_time(Side(formula, must_hold=False))
+    sides, margins, _ = _margins(inner, over_time)
+    return dict(zip(sides, margins.min(axis=1).tolist(), strict=True)) if len(sides) > 1 else {}
+
+
+def apart(samples: Mapping[int, Mapping[Side, float]]) -> str:
+    """In which samples, by number, each of what must happen together did, as ``closest`` tells of each.
+
+    Empty if one sample was the nearest in all of it: its robustness tells as much.
+    """
+    words, found = [], set(samples)
+    for side in next(iter(samples.values()), ()):
+        off = {number: closest[side] for number, closest in samples.items()}
+        least = max(min(off.values()), 0.0)
+        nearest = [number for number in off if off[number] <= least]
+        found &= set(nearest)
+        where = f"sample{'s' * (len(nearest) > 1)} {listed([*map(str, nearest[:_MOST_NEAREST])])}"
+        if len(nearest) > _MOST_NEAREST:
+            where = f"{len(nearest)} samples, the first of them {nearest[0]}"
+        words.append(
+            f"{side} in {where}" if least == 0 else f"{side} in none, off by {shown(least):.4g} in {where}"
+        )
+    return f"Of what a violation needs at one time: {'; '.join(words)}." if words and not found else ""
+
+
 def near_misses(side: Side, times: Array, over_time: Mapping[Formula, Array]) -> Iterator[NearMiss]:
     """When as many as ever, but not all, did what they must do together: once for each of those that did not.
 
@@ -80,10 +111,7 @@ def near_misses(side: Side, times: Array, over_time: Mapping[Formula, Array]) ->
     times, that at which what a missing window asks for was least far away. What never did what it must is
     looked at in the same way.
     """
-    inner = at_one_time(side)
-    sides = list(_divided(inner))
-    asked = np.flatnonzero(~np.isnan(over_time[inner.part]))  # a part may be asked for elsewhere, too
-    margins = np.array([over_time[part][asked] * (-1 if must_hold else 1) for part, must_hold in sides])
+    sides, margins, asked = _margins(at_one_time(side), over_time)
     is_met = margins < 0
     is_always_met = np.asarray(is_met.all(axis=1))
     counts = is_met.sum(axis=0)
@@ -122,6 +150,13 @@ def asked_for(
     before, after = found[first - 1], found[first]
     early, late = times[samples] + start - before, after - times[samples] - end
     return np.minimum(early, late), np.where(early < late, before, after)
+
+
+def _margins(side: Side, over_time: Mapping[Formula, Array]) -> tuple[list[Side], Array, NDArray[np.intp]]:
+    """What must happen together, how far each is off, shape (sides, n), and the samples where it counts."""
+    sides = list(_divided(side))
+    asked = np.flatnonzero(~np.isnan(over_time[side.part]))  # a part may be asked for elsewhere, too
+    return sides, np.array([over_time[p][asked] * (-1 if must_hold else 1) for p, must_hold in sides]), asked
 
 
 def _divided(side: Side) -> Iterator[Side]:

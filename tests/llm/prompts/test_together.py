@@ -6,7 +6,14 @@ import pytest
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import listed
 from falsifier.evaluation.evaluate import compiled
-from falsifier.llm.prompts.together import Side, longest_failure, near_misses, recurring
+from falsifier.llm.prompts.together import (
+    Side,
+    apart,
+    closest,
+    longest_failure,
+    near_misses,
+    recurring,
+)
 from falsifier.stl import parse
 
 TIMES = np.linspace(0.0, 10.0, 11)
@@ -61,3 +68,26 @@ def test_the_longest_failure_of_what_must_recur() -> None:
     assert recurring(parse("G[1,2] G[2,3] F[1,3] (y >= 2)")) == (parse("y >= 2"), 2.0, 4.0, 8.0)
     assert longest_failure(parsed, TIMES, over_time) == (4.0, 9.0)
     assert longest_failure(parse("G (y >= 2)"), TIMES, over_time) is None
+
+
+@pytest.mark.parametrize(
+    ("formula", "told"),
+    [
+        (
+            "G (x <= 6 or y <= 9)",
+            "x <= 6 fails in samples 1 and 3; y <= 9 fails in none, off by 1 in sample 2",
+        ),
+        (
+            "not F (x >= 12 and y >= 7)",
+            "x >= 12 holds in none, off by 2 in samples 1 and 3; y >= 7 holds in sample 2",
+        ),
+        ("G (x <= 6 or y <= 4)", ""),  # sample 1 did both, if not at one time
+        ("G[0,3] (x <= 6 and y <= 9)", ""),
+    ],
+)
+def test_in_which_samples_each_of_what_a_violation_needs_happened(formula: str, told: str) -> None:
+    parsed, other = parse(formula), Trajectory(TIMES, {"x": 0 * TIMES, "y": np.full_like(TIMES, 8.0)})
+    monitor = compiled(parsed, 1.0, len(TIMES))
+    found = [closest(parsed, monitor.courses(t)) for t in (TRAJECTORY, other, TRAJECTORY)]
+    text = apart({n: sides for n, sides in enumerate(found, start=1) if sides})
+    assert text == (f"Of what a violation needs at one time: {told}." if told else "")
