@@ -2,7 +2,7 @@
 
 from falsifier.core.space import SearchSpace
 
-_FIRST = "If names or descriptions suggest how a violation comes about, begin with that; otherwise, {}."
+_BY_NAMES = "If names or descriptions suggest how a violation comes about, begin with that; otherwise, "
 _FIRST_OF = {
     "parameters": "the limits of the ranges are good first samples",
     "jumping": (
@@ -14,37 +14,41 @@ _FIRST_OF = {
     ),
 }
 _ON_TIME = (
-    "Look at the times that decided the robustness values, or at which a violation was nearest, and change "
-    "the {what} so that the signals at such a time move towards violating the requirement."
+    "Look at the times {which}, and change the {what} so that the signals at such a time move towards "
+    "violating the requirement."
 )
-_ON_STRATEGY = (
-    "As long as samples improve, go on from the best ones, or between two of them. If they stop improving, "
-    "do not just repeat the best one with small changes, unless it was very close to a violation, but "
-    "try a different strategy{such}."
+_DECIDED, _NEAREST = "that decided the robustness values", "at which a violation was nearest"
+_IMPROVING = "Samples improve: go on from the best ones, or combine what led on in several."
+_STUCK = (
+    "The last two samples were no better: do not just repeat the best one with small changes, unless it was "
+    "very close to a violation, but try a different strategy{such}."
 )
 _ON_PLATEAU = "Do not just repeat a sample with small changes, but try a different strategy{such}."
 _SUCH = (
-    ", such as a single short pulse, a small amplitude, a slow change or a faster repetition; the limits of "
-    "the ranges are not always the worst, as values just short of what the system reacts to may be"
+    ", such as a short pulse, a small amplitude, a slow change, a faster repetition, or values just inside "
+    "the limits"
 )
 
 
-def on_first(space: SearchSpace) -> str:
-    """What is a good first sample."""
+def on_first(space: SearchSpace, *, is_named: bool) -> str:
+    """What is a good first sample; ``is_named``: names and descriptions are those of the model."""
+    kind = "jumping" if _only_jumps(space) and not space.parameters else "inputs"
     if not any(r.free or r.control_points > 1 for r in space.inputs):
-        return _FIRST.format(_FIRST_OF["parameters"])
-    return _FIRST.format(_FIRST_OF["jumping" if _only_jumps(space) and not space.parameters else "inputs"])
+        kind = "parameters"
+    text = f"{_BY_NAMES if is_named else ''}{_FIRST_OF[kind]}."
+    return text[0].upper() + text[1:]
 
 
-def on_next(space: SearchSpace, *, count: int, is_timed: bool, is_flat: bool) -> str:
-    """How to use so many samples; empty if there is nothing to say.
+def on_time(space: SearchSpace, *, is_joint: bool) -> str:
+    """At which times to look; ``is_joint``: several things must happen together, and one of them decided."""
+    which, what = _NEAREST if is_joint else _DECIDED, "inputs" if space.inputs else "parameters"
+    return _ON_TIME.format(which=which, what=what)
 
-    ``is_timed``: the times that decided their robustness tell something; ``is_flat``: it was the same in all.
-    """
-    what, such = "inputs" if space.inputs else "parameters", "" if _only_jumps(space) else _SUCH
-    on_time = [_ON_TIME.format(what=what)] if is_timed else []
-    on_strategy = [(_ON_PLATEAU if is_flat else _ON_STRATEGY).format(such=such)] if count > 1 else []
-    return "\n".join((*on_time, *on_strategy))
+
+def on_strategy(space: SearchSpace, *, is_flat: bool, is_stuck: bool) -> str:
+    """How to go on; ``is_flat``: robustness was the same in all samples; ``is_stuck``: it fell no more."""
+    text = _ON_PLATEAU if is_flat else _STUCK if is_stuck else _IMPROVING
+    return text.format(such="" if _only_jumps(space) else _SUCH)
 
 
 def _only_jumps(space: SearchSpace) -> bool:

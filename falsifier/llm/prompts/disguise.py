@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import TypeVar
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.model import Kind, ModelInfo, Variable
+from falsifier.core.model import Causality, Kind, ModelInfo, Variable
 from falsifier.core.ranges import InputRange, ParameterRange, ValueKind
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
@@ -59,7 +59,7 @@ class Disguise:
                 name="not named",
                 description="Names are neutral and numbers have no units",
                 variables=tuple(
-                    Variable(names[name], self._kind(name), real.variable(name).causality) for name in others
+                    Variable(names[name], self._kind(name), self._causality(name)) for name in others
                 ),
             ),
             requirement=Requirement("R", replaced(real.requirement.formula, self._signals)),
@@ -69,6 +69,7 @@ class Disguise:
                 space.stop_time,
             ),
             experiment=replace(real.experiment, outputs=tuple(names[n] for n in real.experiment.outputs)),
+            is_named=False,
         )
 
     def hidden(self, evaluation: Evaluation) -> Evaluation:
@@ -119,6 +120,11 @@ class Disguise:
     def _kind(self, name: str) -> Kind:
         """Whether a signal is discrete, which is told by its changes; no type is told but that."""
         return "real" if self.real.variable(name).kind == "real" else "enumeration"
+
+    def _causality(self, name: str) -> Causality:
+        """That of a signal; of one that starts at the parameter of the same name, not the parameter's."""
+        known = self.real.variable(name).causality
+        return "output" if known == "parameter" else known
 
     @cached_property
     def _signals(self) -> dict[Name, Name]:

@@ -18,7 +18,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import published
-from falsifier.llm.prompts.advice import on_first, on_next
+from falsifier.llm.prompts.advice import on_first, on_strategy, on_time
 from falsifier.llm.prompts.numbers import as_signals, number
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
@@ -201,7 +201,7 @@ class Questions:
         is_own = not self._variant.is_published
         waiting = ["; ".join(self._chosen(c)) for c in pending]
         if not self._samples and not waiting and not notes:
-            first = f"{on_first(self._view.space)} " if is_own else ""
+            first = f"{on_first(self._view.space, is_named=self._view.is_named)} " if is_own else ""
             if budget is not None:
                 first += f"Nothing has been simulated yet; {counted(budget, 'simulation')} may be spent. "
             yield f"{first}Propose the first {wanted}."
@@ -215,11 +215,7 @@ class Questions:
         if waiting:
             yield "\n".join((_PENDING, *waiting))
         if is_own and self._judged:
-            is_ranked_otherwise = self._is_flat() or self._best_first()[0].failure > 0
-            is_timed = not is_ranked_otherwise and any(s.is_timed for s in self._judged)
-            count, is_flat = len(self._judged), self._is_flat()
-            if advice := on_next(self._view.space, count=count, is_timed=is_timed, is_flat=is_flat):
-                yield advice
+            yield from self._advice()
         if is_own and _RUN.search(self._lasting()):
             yield _RUNS
         yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
@@ -246,9 +242,22 @@ class Questions:
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
             yield "\n".join((*few, *self._climb.lines))
-        if self._climb.is_told or self._is_flat():
+        if self._climb.is_told or self._is_flat() or self._is_stuck():
             untried = _UNTRIED.format(gaps) if (gaps := self._tried.gaps) else ""
             yield from (text for text in (self._reached.unmoved, untried) if text)
+
+    def _advice(self) -> Iterator[str]:
+        """How to use the samples with a verdict, of which there are some."""
+        is_flat, is_joint = self._is_flat(), any(s.closest for s in self._judged)
+        is_ranked_otherwise = is_flat or self._best_first()[0].failure > 0
+        if not is_ranked_otherwise and any(s.is_timed for s in self._judged):
+            yield on_time(self._view.space, is_joint=is_joint)
+        if len(self._judged) > 2 or is_flat:
+            yield on_strategy(self._view.space, is_flat=is_flat, is_stuck=self._is_stuck())
+
+    def _is_stuck(self) -> bool:
+        """Whether the last two samples were no better than those before."""
+        return len(self._judged) > 2 and self._best_first()[0] not in self._judged[-2:]
 
     def _is_flat(self) -> bool:
         """Whether several samples had the same robustness, and none had another."""

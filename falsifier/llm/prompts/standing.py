@@ -91,7 +91,7 @@ _FREE_NOTE = (
 )
 _FIXED_NOTE = ' The control points of {} are fixed: leave "times" empty, and give as many values as shown.'
 _LESSONS_NOTE = (
-    '"lessons" is shown to you again in the next question, in place of the earlier one: two or three '
+    '"lessons" is shown to you again in the next question, in place of the earlier one: up to six '
     "sentences on what you know by now of the system and what remains to be tried."
 )
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.ranges import Range
+from falsifier.core.words import listed
 from falsifier.llm.prompts.numbers import bounds
 from falsifier.llm.prompts.view import View
 
@@ -35,14 +36,18 @@ class Tried:
     @property
     def gaps(self) -> str:
         """What no sample tried; empty if they tried about all."""
-        return "; ".join(gap for r in self.view.space.ranges if (gap := self._gap(r)))
+        alike: dict[str, list[str]] = {}
+        for r in self.view.space.ranges:
+            if gap := self._gap(r):
+                alike.setdefault(gap, []).append(r.name)
+        return "; ".join(f"{listed(names)} {gap}" for gap, names in alike.items())
 
     def _gap(self, r: Range) -> str:
         tried = sorted(self._values.get(r.name, ()))
         if r.kind != "real" and r.high - r.low < _VALUES:
             left = [str(n) for n in r.numbers if n not in tried]
-            listed = ", ".join((*left[:_MOST_LISTED], *(["..."] if len(left) > _MOST_LISTED else [])))
-            return f"{r.name} = {listed}" if left else ""
+            few = ", ".join((*left[:_MOST_LISTED], *(["..."] if len(left) > _MOST_LISTED else [])))
+            return f"= {few}" if left else ""
         edges = [r.low, *tried, r.high]
         gaps = np.diff(r.share_of(np.array(edges)))
         told = []
@@ -54,4 +59,4 @@ class Tried:
                 told.append(f"above {low} up to {high}")
             else:
                 told.append(f"between {low} and {high}")
-        return f"{r.name} {', '.join(told)}" if told else ""
+        return ", ".join(told)

@@ -37,6 +37,7 @@ class View:
     space: SearchSpace
     experiment: Experiment
     context: Context = field(default_factory=Context)
+    is_named: bool = True  # whether names and descriptions are those of the model
 
     @classmethod
     def of(cls, problem: Problem) -> "View":

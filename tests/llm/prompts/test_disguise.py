@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.model import Variable
 from falsifier.core.ranges import InputRange
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
@@ -16,7 +17,7 @@ from falsifier.engines.llm import LLMEngine
 from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.conversation import RejectedReplyError
 from falsifier.llm.messages import ChatRequest
-from falsifier.llm.prompts import VARIANTS, View
+from falsifier.llm.prompts import VARIANTS, Questions, View
 from falsifier.llm.prompts.disguise import Disguise
 from falsifier.llm.prompts.standing import standing
 from falsifier.llm.replies import ReplyForm
@@ -139,3 +140,16 @@ def test_numbers_of_an_enumeration_with_gaps_are_told_and_no_others_taken() -> N
     assert candidate.signals["u1"].values == (3, 7)
     with pytest.raises(RejectedReplyError, match="2 is none of its numbers"):
         form.read(json.dumps({"signals": {"u1": [2, 7]}}))
+
+
+def test_a_signal_that_starts_at_a_parameter_of_its_name_is_told_so() -> None:
+    problem = lag_problem(parameters=[START])
+    twice = replace(
+        problem.info, variables=(*problem.info.variables, Variable(START.name, causality="output"))
+    )
+    view = Disguise.of(replace(View.of(problem), info=twice)).view
+    assert "- start value p1; from -1 to 1" in standing(view, VARIANTS["MP5"])
+    first = Questions(view, VARIANTS["MP5"]).ask()[1].content
+    assert first.startswith("The limits of the ranges are good first samples"), (
+        "neutral names suggest nothing"
+    )

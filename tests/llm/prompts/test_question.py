@@ -287,6 +287,22 @@ def test_values_that_were_not_tried_are_told_of_each_kind() -> None:
     assert tried.gaps == "n = 3, 4, 5, 6, 7, 8; R above 1e-05 up to 0.01"
 
 
+def test_ranges_in_which_the_same_was_not_tried_are_told_together() -> None:
+    inputs = (InputRange(name, 0, 1, control_points=2, interpolation="linear") for name in ("u", "v", "w"))
+    space = SearchSpace(tuple(inputs), (), 10.0)
+    tried = Tried(replace(View.of(PROBLEM), space=space))
+    tried.add(space.decode([0.0, 0.1, 0.0, 0.1, 0.0, 0.5]))
+    assert tried.gaps == "u and v above 0.1 up to 1; w above 0.5 up to 1"
+
+
+def test_how_to_go_on_follows_from_whether_the_last_two_samples_were_better() -> None:
+    falling = [[0.1] * 5, [0.3] * 5, [0.5] * 5]
+    better, worse = (asked_each(PROBLEM, sampled(PROBLEM, *each)) for each in (falling, falling[::-1]))
+    assert "Samples improve" not in better[1].content and "Samples improve" in better[2].content
+    assert "The last two samples were no better" in worse[2].content
+    assert "Not tried so far" in worse[2].content and "Not tried so far" not in better[2].content
+
+
 def test_all_changes_of_a_moment_are_told_if_one_of_them_is_new() -> None:
     view = View.of(lag_problem("G[0,10] (x <= 0.9)"))
     kinds = (Variable("x", kind="boolean"), Variable("n", kind="integer"))
