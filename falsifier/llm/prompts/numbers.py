@@ -28,6 +28,8 @@ _ROUNDED_DIGITS = 15
 # Digits of the width of a range to which values of signals and parameters are shown.
 _DIGITS_OF_RANGE = 4
 _DIGITS_OF_PARAMETER = 5
+# Decimals beyond these of a value that has no more.
+_MORE_DECIMALS = 3
 # Below the one and from the other on, numbers are written with exponents, as formulas write them.
 _TINY, _HUGE = 1e-4, 1e15
 # Switches of a signal up to which every one is told; of others those by more than a share of the range.
@@ -138,7 +140,9 @@ def as_signals(view: View, candidate: Candidate, *, in_brief: bool = False) -> t
         alike.setdefault(told, []).append(r.name)
     lines = [f"{', '.join(names)}: {told}" for told, names in alike.items()]
     for p in view.space.parameters:
-        lines.append(f"{p.name} = {chosen(p, candidate.parameters[p.name], _DIGITS_OF_PARAMETER)}")
+        value, decimals = candidate.parameters[p.name], decimals_for(p.high - p.low, _DIGITS_OF_PARAMETER)
+        is_short = p.scale != "log" and _told(value, decimals) == value
+        lines.append(f"{p.name} = {chosen(p, value, _DIGITS_OF_PARAMETER + _MORE_DECIMALS * is_short)}")
     return tuple(lines)
 
 
@@ -149,10 +153,15 @@ def chosen(ranged: Range | Dimension, value: float, digits: int, *, least: int =
     return plain(value, max(least, decimals_for(ranged.high - ranged.low, digits)))
 
 
+def _told(value: float, decimals: int) -> float:
+    """A value with so many decimals; as it is if it has a few more, as those of a reply may."""
+    return value if round(value, decimals + _MORE_DECIMALS) == value else round(value, decimals)
+
+
 def _signal_text_in(r: InputRange, signal: Signal, stop_time: float, *, in_brief: bool) -> str:
     """Parameterization with values rounded to some thousandths of the range."""
     decimals = decimals_for(r.high - r.low, _DIGITS_OF_RANGE)
-    rounded = replace(signal, values=tuple(round(v, decimals) for v in signal.values))
+    rounded = replace(signal, values=tuple(_told(v, decimals) for v in signal.values))
     if signal.interpolation == "constant" and rounded.switches > _MOST_PIECES:
         rough = _merged(rounded, _ROUGHLY * (r.high - r.low))
         if in_brief and rough.switches > _MOST_IN_BRIEF:

@@ -47,6 +47,14 @@ def test_inputs_that_do_the_same_are_told_together() -> None:
     assert alike == ("u, v: constant -0.5", "x0 = 0.25")
 
 
+def test_values_with_few_digits_more_than_usual_are_told_as_they_are() -> None:
+    given = Candidate(
+        {n: Signal((0.0,), (v,), "constant") for n, v in (("u", 0.032125), ("v", 1 / 3))}, {"x0": 0.1234567}
+    )
+    assert as_signals(VIEW, given) == ("u: constant 0.032125", "v: constant 0.333", "x0 = 0.1234567")
+    assert as_signals(VIEW, replace(given, parameters={"x0": 1 / 3}))[-1] == "x0 = 0.3333"
+
+
 def test_in_brief_a_signal_of_many_pieces_is_only_described() -> None:
     times = [0.0, 2.5, *(2.5 + 0.25 * k for k in range(1, 30))]
     signal = Signal(tuple(times), tuple(float(k % 2) for k in range(31)), "constant")

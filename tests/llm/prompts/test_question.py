@@ -159,7 +159,7 @@ def test_failed_samples_rationales_lessons_and_inputs_that_look_alike() -> None:
     assert "no verdict, the simulation crashed: division by zero" in only and "output values" not in only
     assert "crashed" not in told(PROBLEM, "MP4", [failed])[1]
     questions = Questions(View.of(PROBLEM), VARIANTS["MP5"])
-    first, alike = sampled(PROBLEM, [0.5] * 5, [0.5 + 1e-6, 0.5, 0.5, 0.5, 0.5])
+    first, alike = sampled(PROBLEM, [0.5] * 5, [0.5 + 1e-7, 0.5, 0.5, 0.5, 0.5])
     questions.tell(first, why="a step\nup " + "and on " * 100)
     questions.tell(alike)
     text = questions.ask(lessons="x follows u")[1].content
