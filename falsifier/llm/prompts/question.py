@@ -91,7 +91,7 @@ class Questions:
         self._fixed = self._count(self._standing(1))
         self._aim = min(MOST_PROMPT_TOKENS, max(USUAL_PROMPT_TOKENS, 2 * self._fixed))
         self._samples: list[_Sample] = []  # those that are told
-        self._judged: list[_Sample] = []  # all with a verdict, by which samples are ranked
+        self._judged: list[_Sample] = []  # all with a verdict, by which own variants rank them
         self._told = self._omitted = 0
         self._inputs: dict[str, int] = {}
         self._reached = Reached(view)
@@ -194,28 +194,26 @@ class Questions:
     ) -> Iterator[str]:
         wanted = f"{count} different samples" if count > 1 else "sample"
         budget = simulations if self._variant.has("circumstances") else None
-        is_own = not self._variant.is_published
         waiting = ["; ".join(self._chosen(c)) for c in pending]
         if not self._samples and not waiting and not notes:
-            first = f"{on_first(self._view.space)} " if is_own else ""
+            first = "" if self._variant.is_published else f"{on_first(self._view.space)} "
             if budget is not None:
                 first += f"Nothing has been simulated yet; {counted(budget, 'simulation')} may be spent. "
             yield f"{first}Propose the first {wanted}."
             return
-        if is_own and self._samples:
-            yield from self._standings()
+        yield from self._standings()
         yield from notes
         if lessons and self._variant.has("lessons"):
             yield f"Your lessons so far: {lessons}"
         if waiting:
             yield "\n".join((_PENDING, *waiting))
-        if is_own and self._judged:
-            is_ranked_otherwise = self._is_flat() or self._best_first()[0].failure > 0
-            is_timed = not is_ranked_otherwise and any(s.is_timed for s in self._judged)
-            count, is_flat = len(self._judged), self._is_flat()
-            if advice := on_next(self._view.space, count=count, is_timed=is_timed, is_flat=is_flat):
+        if self._judged:
+            is_flat, is_long = self._is_flat(), self._best_first()[0].failure > 0
+            is_timed = not is_flat and not is_long and any(s.is_timed for s in self._judged)
+            judged = len(self._judged)
+            if advice := on_next(self._view.space, count=judged, is_timed=is_timed, is_flat=is_flat):
                 yield advice
-        if is_own and _RUN.search(self._lasting()):
+        if _RUN.search(self._lasting()):
             yield _RUNS
         yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
 
