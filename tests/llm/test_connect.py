@@ -181,12 +181,6 @@ def test_a_missing_key_that_only_litellm_misses_is_told_at_once() -> None:
         connect("fireworks_ai/x").complete(PLAIN)
 
 
-def test_keys_of_providers_that_are_not_listed_are_checked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("HOSTED_VLLM_API_KEY", "ab“c")
-    with pytest.raises(ChatSetupError, match="HOSTED_VLLM_API_KEY in the environment: character 3 of 4"):
-        find_key("hosted_vllm/x", api_base="http://127.0.0.1/v1")
-
-
 @pytest.mark.parametrize("address", ["http://127.0.0.1:80/v 1", " http://127.0.0.1:80/v1", "http://a\tb/v1"])
 def test_an_address_has_no_blanks(address: str) -> None:
     with pytest.raises(ChatSetupError, match=r"expected http://HOST:PORT/v1"):
@@ -214,13 +208,16 @@ def test_an_option_with_a_value_that_cannot_be_sent_or_kept_is_refused(
         LLMSettings(name="ollama_chat/x", options=options)
 
 
-@pytest.mark.parametrize("key", ["\u201csk-1\u201d", "sk-\u00e4", "sk-1\nsk-2"])
+@pytest.mark.parametrize("provider", ["openai", "hosted_vllm"])  # with a variable that is listed, and without
+@pytest.mark.parametrize(("key", "place"), [("\u201csk-1\u201d", 1), ("sk-\u00e4", 4), ("sk-1\nsk-2", 5)])
 def test_a_key_that_no_request_can_contain_is_refused_and_not_shown(
-    key: str, monkeypatch: pytest.MonkeyPatch
+    provider: str, key: str, place: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("OPENAI_API_KEY", key)
-    with pytest.raises(ChatSetupError, match=r"^OPENAI_API_KEY in the environment: character ") as caught:
-        connect("openai/gpt-5-mini")
+    variable = f"{provider.upper()}_API_KEY"
+    monkeypatch.setenv(variable, key)
+    told = f"^{variable} in the environment: character {place} of {len(key)} "
+    with pytest.raises(ChatSetupError, match=told) as caught:
+        connect(f"{provider}/x", api_base="http://127.0.0.1/v1")
     assert "sk-" not in str(caught.value)
 
 
