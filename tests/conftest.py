@@ -1,4 +1,4 @@
-"""What all tests share: no keys in the environment, no network but this machine's own, an own cache."""
+"""What all tests share: no key and no address of an LLM in the environment, no network, an own cache."""
 
 import gc
 import os
@@ -66,7 +66,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def closed_network() -> Any:
     patch = pytest.MonkeyPatch()
     patch.setattr(socket.socket, "connect", _guarded_connect)
-    for name in [n for n in os.environ if n.endswith(("_API_KEY", "_TOKEN"))]:
+    for name in [n for n in os.environ if n.endswith(("_API_KEY", "_TOKEN", "_API_BASE", "_BASE_URL"))]:
         patch.delenv(name)
     yield
     patch.undo()

@@ -100,11 +100,10 @@ def _model(info: ModelInfo, experiment: Experiment) -> Iterator[str]:
         f"{number(experiment.output_interval)} s; bounds of windows are multiples of that."
     )
     yield "Signals:"
-    listed = [v for v in (*info.inputs, *info.outputs) if v.kind != "string"]
-    others = [v for v in info.with_causality("local") if v.kind != "string"]
-    shown = [*listed, *others][:_MOST_VARIABLES]
-    yield from map(_variable, shown)
-    if hidden := len(listed) + len(others) - len(shown):
+    variables = (*info.inputs, *info.outputs, *info.with_causality("local"))
+    told = [_variable(v) for v in variables if v.kind != "string"]
+    yield from told[:_MOST_VARIABLES]
+    if hidden := len(told[_MOST_VARIABLES:]):
         yield f"and {hidden} more variables"
 
 

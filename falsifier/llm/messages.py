@@ -5,7 +5,7 @@ from math import inf
 from time import monotonic
 from typing import Any, Literal, Protocol, get_args
 
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import Field
 
 from falsifier.core.arguments import instance
 from falsifier.core.literals import printable
@@ -31,13 +31,10 @@ class Message(Strict):
     role: Role
     content: str
     stable: int = Field(
-        default=0, description="Characters at its beginning that the next question will begin with, too."
+        default=0,
+        exclude_if=lambda count: not count,  # few messages have one, and a journal contains many messages
+        description="Characters at its beginning that the next question will begin with, too.",
     )
-
-    @model_serializer(mode="wrap")
-    def _without_an_empty_beginning(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # Few messages have one, and a journal contains many messages.
-        return {k: v for k, v in handler(self).items() if v or k != "stable"}
 
 
 class Usage(Strict):

@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from tests.patience import HANG
-
 
 @dataclass(frozen=True)
 class Step:
@@ -31,10 +29,6 @@ class Step:
         }
     )
     hang_up: bool = False
-    # It closes the connection within its answer.
-    cut: bool = False
-    # It never answers: the client must give up.
-    silent: bool = False
 
 
 @dataclass(frozen=True)
@@ -57,7 +51,6 @@ class Server:
         self.script = script
         self.received: list[Received] = []
         self._lock = threading.Lock()
-        self._closing = threading.Event()
         outer = self
 
         class Handler(BaseHTTPRequestHandler):
@@ -73,9 +66,7 @@ class Server:
                 with outer._lock:
                     outer.received.append(Received(self.path, headers, body))
                     step = outer.script.pop(0) if outer.script else Step(status=410, message="script ended")
-                if step.silent:
-                    outer._closing.wait(HANG)
-                if step.hang_up or step.silent:
+                if step.hang_up:
                     self.close_connection = True
                     return
                 if step.raw is not None:
@@ -87,8 +78,7 @@ class Server:
                 with suppress(BrokenPipeError, ConnectionResetError):
                     self.send_response(step.status)
                     self.send_header("content-type", "application/json")
-                    self.send_header("content-length", str(len(payload) + 1000 * step.cut))
-                    self.close_connection = step.cut
+                    self.send_header("content-length", str(len(payload)))
                     for name, value in step.headers.items():
                         self.send_header(name, value)
                     self.end_headers()
@@ -112,7 +102,6 @@ class Server:
         self._thread.start()
 
     def close(self) -> None:
-        self._closing.set()
         self._http.shutdown()
         self._http.server_close()
 

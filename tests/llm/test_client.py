@@ -19,6 +19,7 @@ from falsifier.llm.json_text import schema_of_object
 from falsifier.llm.messages import ChatRequest, Message, Usage
 from falsifier.llm.providers import first_mode
 from falsifier.llm.usage import Price, count_tokens
+from tests.hostile.servers import answers, hangs, misbehaving, response, sends
 from tests.llm.server import Step, serving
 
 SCHEMA = schema_of_object(rationale={"type": "string"})
@@ -219,15 +220,17 @@ def test_counts_of_a_wrong_form_are_counted_here(counts: Any, sent: int | None, 
 
 
 @pytest.mark.parametrize(
-    ("raw", "count"),
+    ("sent", "count"),
     [
-        *(('{"choices": []}', 1), ('{"id": "1"}', 1), ('{"error": "x"}', 0), ("<p>x</p>", 0)),
-        ('{"choices": [', 1),
+        (response(b'{"choices": []}'), 1),
+        (response(b'{"choices": []}')[:-2], 1),  # it closes the connection within its answer
+        (response(b'{"id": "1"}'), 1),
+        (response(b'{"error": "x"}'), 0),
+        (response(b"<p>x</p>"), 0),
     ],
 )
-def test_an_answer_that_cannot_be_used_is_counted(raw: str, count: int) -> None:
-    step = Step(raw=raw, cut=not raw.endswith((">", "}")))
-    with serving(step) as server, pytest.raises(TransientChatError) as caught:
+def test_an_answer_that_cannot_be_used_is_counted(sent: bytes, count: int) -> None:
+    with misbehaving(sends(sent)) as server, pytest.raises(TransientChatError) as caught:
         LiteLLMChat("openai/mine", api_base=server.url, price=Price(1.0, 1.0)).send(REQUEST)
     lost = caught.value.lost or Usage()
     assert lost.without_reply == count and bool(lost.prompt_tokens) == bool(lost.cost) == bool(count)
@@ -269,13 +272,13 @@ def test_one_request_is_one_request(step: Step, kind: type[ChatError] | None, sa
 
 @pytest.mark.parametrize("model", ["openai/mine", "hosted_vllm/mine"])
 def test_a_request_without_an_answer_in_time_is_counted(model: str) -> None:
-    with serving(Step("an answer"), Step(silent=True)) as server:
+    with misbehaving(answers(), hangs()) as server:
         LiteLLMChat(model, api_base=server.url).send(REQUEST)  # the first one imports for a while
         with pytest.raises(TransientChatError) as caught:
             LiteLLMChat(model, api_base=server.url, timeout=2).send(REQUEST)
     assert caught.value.lost is not None
     assert caught.value.lost.without_reply == 1 and caught.value.lost.prompt_tokens > 0
-    assert len(server.received) == 2
+    assert len(server.requests) == 2
 
 
 def test_a_request_that_is_interrupted_is_counted(monkeypatch: pytest.MonkeyPatch) -> None:

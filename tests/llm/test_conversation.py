@@ -59,7 +59,6 @@ def test_two_reasks_at_most() -> None:
     ("reply", "problem"),
     [
         (ChatReply(text=""), "empty"),
-        (ChatReply(text="sev", finish_reason="length"), "cut off"),
         (ChatReply(text="", reasoning="7", finish_reason="length"), "cut off"),
         (ChatReply(text="no", finish_reason="refusal"), "refuses"),
         (ChatReply(text="", finish_reason="content_filter"), "content filter"),

@@ -77,33 +77,30 @@ def test_a_wait_beyond_the_deadline_is_not_begun(naps: list[float]) -> None:
     assert naps == []
 
 
+LATE, IN_VAIN = TransientChatError("late"), ChatError("not readable")
+LATE.lost = Usage(prompt_tokens=50, cost=0.5, estimated=True, without_reply=1)
+IN_VAIN.lost = Usage(prompt_tokens=9, cost=0.25, estimated=True, without_reply=1)
+
+
 def test_requests_that_timed_out_are_counted_as_paid() -> None:
-    late = TransientChatError("late")
-    late.lost = Usage(prompt_tokens=50, cost=0.5, estimated=True, without_reply=1)
-    usage = asked(ScriptedChat([late, late, "yes"])).usage
+    usage = asked(ScriptedChat([LATE, LATE, "yes"])).usage
     assert (usage.without_reply, usage.estimated) == (2, True)
     plain = ScriptedChat(["yes"]).complete(PLAIN).usage
     assert usage.prompt_tokens == plain.prompt_tokens + 100
     assert usage.cost == (None if plain.cost is None else plain.cost + 1.0)
     with pytest.raises(ChatError) as caught:
-        asked(ScriptedChat([late, late]), attempts=2)
+        asked(ScriptedChat([LATE, LATE]), attempts=2)
     assert caught.value.lost == Usage(prompt_tokens=100, cost=1.0, estimated=True, without_reply=2)
     for limit, told in ((Budget(tokens=80), "80 tokens"), (Budget(cost=0.8), "0.8 US dollars")):
-        server = ScriptedChat([late] * 3)
+        server = ScriptedChat([LATE] * 3)
         with pytest.raises(LimitReached, match=f"{told} is used up"):
             RunChat(Served(server=server), limit, Spent, iter(())).complete(PLAIN)
         assert len(server.requests) == 2
 
 
-IN_VAIN = ChatError("not readable")
-IN_VAIN.lost = Usage(prompt_tokens=9, cost=0.25, estimated=True, without_reply=1)
-
-
 @pytest.mark.parametrize("ending", [KeyboardInterrupt(), ChatError("no such model"), IN_VAIN], ids=repr)
 def test_requests_that_timed_out_are_counted_however_the_wait_for_a_reply_ends(ending: BaseException) -> None:
-    late = TransientChatError("late")
-    late.lost = Usage(prompt_tokens=50, cost=0.5, estimated=True, without_reply=1)
-    failures = iter([late, ending])
+    failures = iter([LATE, ending])
     own = getattr(ending, "lost", None) or Usage(cost=0.0)
 
     def fail(_: ChatRequest) -> str:
@@ -111,4 +108,4 @@ def test_requests_that_timed_out_are_counted_however_the_wait_for_a_reply_ends(e
 
     with pytest.raises(type(ending)) as ended:
         asked(ScriptedChat(fail))
-    assert getattr(ended.value, "lost", None) == late.lost + own
+    assert getattr(ended.value, "lost", None) == LATE.lost + own

@@ -207,8 +207,7 @@ def signal_text(signal: Signal, *, stop_time: float) -> str:
     even = even_times(len(signal.times), stop_time=stop_time, interpolation=signal.interpolation)
     if np.allclose(signal.times, even, rtol=0, atol=1e-9 * stop_time):
         return f"{manner}, {len(signal.values)} evenly spaced values {runs(signal.values)}"
-    points = list(zip(signal.times, signal.values, strict=True))
-    if signal.interpolation == "constant":
-        points = [p for i, p in enumerate(points) if i == 0 or p[1] != points[i - 1][1]]
+    told = _merged(signal, 0.0) if signal.interpolation == "constant" else signal
+    points = zip(told.times, told.values, strict=True)
     shown = ", ".join(f"[{number(t)}, {number(v, _ROUNDED_DIGITS)}]" for t, v in points)
     return f"{manner} from [time, value] points [{shown}]"

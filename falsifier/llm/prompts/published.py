@@ -74,14 +74,14 @@ def _outputs(view: View) -> str:
 def _numbers(view: View, *, named: bool) -> Iterator[str]:
     """The numbers to choose, with or without their meanings."""
     dimensions = view.space.dimensions
-    ranged = {r.name: r.kind for r in view.space.inputs} | {p.name: p.kind for p in view.space.parameters}
+    kinds = {r.name: r.kind for r in view.space.ranges}
     yield f"You choose {counted(len(dimensions), 'number')}."
     for i, dimension in enumerate(dimensions, start=1):
         low, high = bounds(dimension.low, dimension.high)
         at = "" if dimension.time is None else f" at t = {_clock(view, dimension.time)}"
         meaning = f": {dimension.name}{at}" if named else ""
         manner = ", searched in decades" if dimension.scale == "log" else ""
-        boolean = named and ranged[dimension.name] == "boolean"
+        boolean = named and kinds[dimension.name] == "boolean"
         yield f"{i}{meaning}, {'0 (false) or 1 (true)' if boolean else f'from {low} to {high}{manner}'}"
     for r in view.space.inputs if named else ():
         held = "" if r.hold is None else f", sampled and held every {r.hold:g} s"

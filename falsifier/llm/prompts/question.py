@@ -93,7 +93,7 @@ class Questions:
         self._fixed = self._count(self._standing(1))
         self._aim = min(MOST_PROMPT_TOKENS, max(USUAL_PROMPT_TOKENS, 2 * self._fixed))
         self._samples: list[_Sample] = []  # those that are told
-        self._judged: list[_Sample] = []  # all with a verdict, by which samples are ranked
+        self._judged: list[_Sample] = []  # all with a verdict, by which own variants rank them
         self._told = self._omitted = 0
         self._inputs: dict[str, int] = {}
         self._reached = Reached(view)
@@ -198,25 +198,25 @@ class Questions:
     ) -> Iterator[str]:
         wanted = f"{count} different samples" if count > 1 else "sample"
         budget = simulations if self._variant.has("circumstances") else None
-        is_own = not self._variant.is_published
         waiting = ["; ".join(self._chosen(c)) for c in pending]
         if not self._samples and not waiting and not notes:
-            first = f"{on_first(self._view.space, is_named=self._view.is_named)} " if is_own else ""
+            is_own, named = not self._variant.is_published, self._view.is_named
+            first = f"{on_first(self._view.space, is_named=named)} " if is_own else ""
             if budget is not None:
                 first += f"Nothing has been simulated yet; {counted(budget, 'simulation')} may be spent. "
             yield f"{first}Propose the first {wanted}."
             return
-        if is_own and self._samples:
-            yield from self._standings()
-            yield from filter(None, (self._regularities.text,))
+        yield from self._standings()
+        if regular := self._regularities.text:
+            yield regular
         yield from notes
         if lessons and self._variant.has("lessons"):
             yield f"Your lessons so far: {lessons}"
         if waiting:
             yield "\n".join((_PENDING, *waiting))
-        if is_own and self._judged:
+        if self._judged:
             yield from self._advice()
-        if is_own and _RUN.search(self._lasting()):
+        if _RUN.search(self._lasting()):
             yield _RUNS
         yield f"{self._left(budget)}Propose the next {wanted}. Do not repeat an earlier one."
 

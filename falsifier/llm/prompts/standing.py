@@ -18,8 +18,7 @@ from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl import Formula, in_words
 from falsifier.stl.formula import Always, And, Eventually, Iff, Implies, Next, Not, Or, Predicate, Until
 
-# Control-point times listed individually; of longer lists the first ones and the last.
-_MAX_TIMES = 25
+# Control-point times listed individually; of more, the distance is told.
 _FEW_TIMES = 5
 # Digits of the limits of what is chosen: a value that exceeds one by a rounding is clamped.
 _DIGITS_OF_BOUNDS = 7
@@ -260,14 +259,10 @@ def _freedom(view: View) -> Iterator[str]:
 
 
 def _control_times(view: View, r: InputRange) -> str:
-    fixed = view.space.fixed_times(r)
-    gap = fixed[1] - fixed[0] if len(fixed) > _FEW_TIMES else 0.0
-    if gap > 0 and all(abs(t - k * gap) < 1e-6 * view.space.stop_time for k, t in enumerate(fixed)):
-        return f"every {number(gap, 5)} s from t = 0"
-    times = [plain(t, decimals_for(view.space.stop_time, 7)) for t in fixed]
-    if len(times) > _MAX_TIMES:
-        times = [*times[:3], "...", times[-1]]
-    return f"at t = {', '.join(times)} s"
+    times = view.space.fixed_times(r)  # evenly spaced
+    if len(times) > _FEW_TIMES:
+        return f"every {number(times[1], 5)} s from t = 0"
+    return f"at t = {', '.join(plain(t, decimals_for(view.space.stop_time, 7)) for t in times)} s"
 
 
 def _values(ranged: InputRange | ParameterRange) -> str:
