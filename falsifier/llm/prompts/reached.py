@@ -60,7 +60,7 @@ class SampleProgress:
                         changes[k] = (*changes.get(k, ()), change)
             elif np.isfinite(column).all():
                 ranges[name] = (float(column.min()), float(column.max()))
-        return cls(frozenset(stages), ranges, changes, frozenset(again))
+        return cls(frozenset(stages), ranges, dict(sorted(changes.items())), frozenset(again))
 
 
 class Reached:

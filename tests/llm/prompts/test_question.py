@@ -241,6 +241,17 @@ def test_of_a_counter_that_rises_far_its_first_values_and_the_last_are_told() ->
         assert reached.news(progress) == values
 
 
+def test_the_first_changes_of_a_counter_are_the_first_in_time() -> None:
+    view = View.of(lag_problem("G[0,10] (x <= 0.9)"))
+    kinds = (Variable("x", kind="boolean"), Variable("n", kind="integer"))
+    view = replace(view, info=ModelInfo("m", variables=kinds))
+    view = replace(view, experiment=replace(view.experiment, outputs=("x", "n")))
+    times = np.linspace(0.0, 10.0, 101)
+    trajectory = Trajectory(times, {"x": np.where(times >= 9, 1.0, 0.0), "n": times // 1})
+    told = Reached(view).switches(SampleProgress.of(view, trajectory), trajectory)
+    assert told == "n 0 -> 1 at 1 s; n 1 -> 2 at 2 s; x 0 -> 1, n 8 -> 9 at 9 s; n 9 -> 10 at 10 s; ..."
+
+
 def test_a_value_that_a_signal_had_or_passed_when_it_was_not_discrete_is_not_new() -> None:
     reached = Reached(View.of(PROBLEM))
     for stages, ranges, new in (
