@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import SpecError
-from falsifier.fmu.description.archive import UNREADABLE, open_archive
+from falsifier.fmu.description.archive import entry_names, read_entries
 from falsifier.fmu.description.xml import read_xml
 
 _MAX_DEPTH = 200
@@ -129,22 +129,10 @@ def read_parts(path: Path) -> dict[str, bytes]:
         ModelError: if it is not a zip archive, or a dangerous one.
         SpecError: naming the part that is damaged or too large.
     """
-    parts = {}
-    with open_archive(path) as archive:
-        for entry in archive.infolist():
-            name = entry.filename
-            if not name.lower().startswith(_READ) or not name.lower().endswith(".xml"):
-                continue
-            if entry.file_size > _MAX_PART_BYTES:
-                raise SpecError(
-                    f"{path}: {name} has {entry.file_size >> 20} MiB, more than {_MAX_PART_BYTES >> 20}; "
-                    "save the subsystem that matters as a model of its own"
-                )
-            try:
-                parts[name] = archive.read(entry)
-            except UNREADABLE as error:
-                raise SpecError(f"{path}: {name} is damaged ({error}); save the model again") from None
-    return parts
+    wanted = (name for name in entry_names(path) if name.lower().startswith(_READ))
+    names = [name for name in wanted if name.lower().endswith(".xml")]
+    smaller = "save the subsystem that matters as a model of its own"
+    return dict(read_entries(path, names, _MAX_PART_BYTES, smaller=smaller, again="save the model again"))
 
 
 class ModelPackage:
