@@ -1,18 +1,15 @@
 """What a problem names as context, and reading it: only for a language model or an engine that uses it."""
 
-import logging
 from dataclasses import replace
-from functools import lru_cache
 from os.path import relpath
 from pathlib import Path
 
 from falsifier.context.values import NOTHING, Context, Named
+from falsifier.errors import warn_once
 from falsifier.fmu import fmu_files
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import Spec
-
-_LOG = logging.getLogger(__name__)
 
 
 def named_context(source: ProblemSource, spec: Spec | None = None, path: Path | None = None) -> Named:
@@ -54,14 +51,8 @@ def with_context(problem: Problem, *, is_told: bool = True) -> Problem:
         is_told=is_told,
     )
     for note in found.notes:
-        _say_once(note)
+        warn_once(note)
     return replace(problem, context=found)
-
-
-@lru_cache(maxsize=1000)
-def _say_once(note: str) -> None:
-    """Warn; a campaign reads the same files for each of its runs."""
-    _LOG.warning(note)
 
 
 def _shown(path: Path) -> str:
