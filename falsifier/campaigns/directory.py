@@ -18,10 +18,9 @@ from falsifier.campaigns.request import CampaignRequest
 from falsifier.core.literals import shell_word
 from falsifier.errors import JournalError, warn_once
 from falsifier.record.files import CAMPAIGN, is_locked, locked, make_folder, read_sealed, write_sealed
-from falsifier.record.journal import JOURNAL, holds_run
+from falsifier.record.journal import JOURNAL, LOCK, holds_run
 from falsifier.record.manifest import MANIFEST, Surroundings, runs_below
 
-_LOCK = "lock"
 # Time in s to wait for the lock: is_worked_on() holds it for a moment.
 _LOCK_PATIENCE = 0.5
 
@@ -98,10 +97,10 @@ def campaign_lock(directory: Path) -> AbstractContextManager[None]:
         f"{directory}: another process is working on this campaign; wait until it ends, or follow it: "
         f"falsifier watch {shell_word(directory)}"
     )
-    return locked(directory / _LOCK, busy=busy, patience=_LOCK_PATIENCE)
+    return locked(directory / LOCK, busy=busy, patience=_LOCK_PATIENCE)
 
 
 def is_worked_on(directory: Path) -> bool:
     """Whether a process holds the campaign's lock; that of a killed process is released by the system."""
-    path = directory / _LOCK
+    path = directory / LOCK
     return path.exists() and is_locked(path)

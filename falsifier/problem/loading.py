@@ -18,7 +18,7 @@ from traceback import extract_tb
 from falsifier.context.values import Named
 from falsifier.core import named
 from falsifier.core.arguments import texts
-from falsifier.core.files import bundled
+from falsifier.core.files import bundled, seen_from_here
 from falsifier.core.literals import one_line, shell_word
 from falsifier.core.model import Interface
 from falsifier.errors import FalsifierError, SpecError, did_you_mean, setting, written
@@ -166,8 +166,8 @@ def source_file(source: ProblemSource) -> Path | None:
     """Return the spec file, SSP package or imported module of a source; None if there is none."""
     if source.parts.kind == "python":
         file = Path(getattr(sys.modules.get(source.target.split(":")[1]), "__file__", None) or "")
-        here = Path.cwd()  # seen from it, as specs are, so that a project can be moved
-        return (file.relative_to(here) if file.is_relative_to(here) else file) if file.is_file() else None
+        # As specs are, so that a project can be moved.
+        return Path(seen_from_here(file)) if file.is_file() else None
     if source.parts.kind == "fmu":
         return Path(source.target) if is_package(source.target) else None
     return find_spec(source.target)[0]

@@ -10,7 +10,7 @@ from falsifier.errors import SpecError
 from falsifier.fmu.description.archive import entry_names, read_entries
 from falsifier.fmu.description.xml import read_xml
 
-_MAX_DEPTH = 200
+_MAX_DEPTH = 200  # of sections, and of parts that refer to each other
 _OPENING = re.compile(r"([\w.$:/+-]++)\s*+\{$")
 _STRING = re.compile(r'"((?:[^"\\]|\\.)*+)"$')
 _VALUE = re.compile(r"([\w.$:/+-]++)\s++(.*)$")
@@ -27,7 +27,6 @@ _SETTINGS = "simulink/configset"
 _MAX_PART_BYTES = 64 << 20
 # Only these are read; a package also contains pictures, histories and caches.
 _READ = (_DIAGRAM, _DEFAULTS, _STATEFLOW, _CHARTS, _SETTINGS, "simulink/systems/")
-_MAX_NESTING = 200
 # Far more than models have. Parts that refer twice to the next one could stand for billions of sections.
 _MAX_SECTIONS = 2_000_000
 _MAX_REFERENCES = 20_000
@@ -184,7 +183,7 @@ class ModelPackage:
         """Return the root section of the part that a reference stands for."""
         self._references += 1
         name = self._stems.get(stem, f"{stem}.xml")
-        if name in within or len(within) > _MAX_NESTING:
+        if name in within or len(within) > _MAX_DEPTH:
             raise SpecError(f"{self._shown}: {within[-1]}: refers to {name}, which contains it")
         if self._references > _MAX_REFERENCES:
             raise SpecError(f"{self._shown}: its parts refer to others more than {_MAX_REFERENCES:,} times")
