@@ -10,10 +10,11 @@ Who is told to state something writes options on the command line, and arguments
 
 import difflib
 import errno
+import logging
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
@@ -195,6 +196,12 @@ class ContextExceededError(ChatError):
 
 class JournalError(FalsifierError):
     """A run directory cannot be read, belongs to another problem or is in use."""
+
+
+@lru_cache(maxsize=1000)
+def warn_once(message: str) -> None:
+    """Log a warning, however often this process looks at what it is about."""
+    logging.getLogger("falsifier").warning(message)
 
 
 def reader() -> Reader:

@@ -8,23 +8,19 @@
     lock              held while a process works on this campaign
 """
 
-import logging
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from functools import cache
 from pathlib import Path
 
 from pydantic import Field
 
 from falsifier.campaigns.request import CampaignRequest
 from falsifier.core.literals import shell_word
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, warn_once
 from falsifier.record.files import CAMPAIGN, is_locked, locked, make_folder, read_sealed, write_sealed
-from falsifier.record.journal import JOURNAL, holds_run
+from falsifier.record.journal import JOURNAL, LOCK, holds_run
 from falsifier.record.manifest import MANIFEST, Surroundings, runs_below
 
-_LOG = logging.getLogger(__name__)
-_LOCK = "lock"
 # Time in s to wait for the lock: is_worked_on() holds it for a moment.
 _LOCK_PATIENCE = 0.5
 
@@ -89,15 +85,9 @@ def _known(places: Sequence[Path], remedy: str) -> list[Path]:
             found.append(place)
         elif (place / JOURNAL).exists() and (place / JOURNAL).stat().st_size:
             # It is empty until a run that begins has written its manifest.
-            _tell_left_out(place, remedy)
+            why = f"it has a journal, but no {MANIFEST}, which says what was searched"
+            warn_once(f"{place} is left out: {why}; {remedy}")
     return found
-
-
-@cache
-def _tell_left_out(place: Path, remedy: str) -> None:
-    """Tell it once, however often a command looks."""
-    why = f"it has a journal, but no {MANIFEST}, which says what was searched"
-    _LOG.warning("%s is left out: %s; %s", place, why, remedy)
 
 
 def campaign_lock(directory: Path) -> AbstractContextManager[None]:
@@ -107,10 +97,10 @@ def campaign_lock(directory: Path) -> AbstractContextManager[None]:
         f"{directory}: another process is working on this campaign; wait until it ends, or follow it: "
         f"falsifier watch {shell_word(directory)}"
     )
-    return locked(directory / _LOCK, busy=busy, patience=_LOCK_PATIENCE)
+    return locked(directory / LOCK, busy=busy, patience=_LOCK_PATIENCE)
 
 
 def is_worked_on(directory: Path) -> bool:
     """Whether a process holds the campaign's lock; that of a killed process is released by the system."""
-    path = directory / _LOCK
+    path = directory / LOCK
     return path.exists() and is_locked(path)

@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 
 from falsifier.core.secrets import line_of_held_secret, line_of_secret
 from falsifier.errors import SpecError, setting
-from falsifier.fmu.description.archive import UNREADABLE, open_archive
+from falsifier.fmu.description.archive import entry_names, read_entries
 
 _DOCUMENTS = (".html", ".htm", ".md", ".txt")
 _RESOURCES = (".txt", ".md", ".json")
@@ -39,26 +39,12 @@ def inside(fmu: Path) -> Iterator[tuple[str, bytes]]:
         ModelError: if the FMU is not a zip archive, or a dangerous one.
         SpecError: naming a file that is too large or cannot be read, or if there are too many.
     """
-    with open_archive(fmu) as archive:
-        entries = [e for e in archive.infolist() if not e.is_dir() and _may_tell(PurePosixPath(e.filename))]
-        if len(entries) > _MAX_FILES:
-            raise SpecError(
-                f"{fmu}: has {len(entries)} documents and sources, more than {_MAX_FILES}; {NAME_THEM}"
-            )
-        for entry in sorted(entries, key=lambda e: e.filename):
-            if entry.file_size > _MAX_BYTES:
-                raise SpecError(
-                    f"{fmu}: {entry.filename} has {entry.file_size >> 20} MiB, more than {_MAX_BYTES >> 20}; "
-                    f"{NAME_THEM}"
-                )
-            try:
-                content = archive.read(entry)
-            except UNREADABLE as error:
-                raise SpecError(
-                    f"{fmu}: {entry.filename} is damaged ({error}); copy or export the FMU again"
-                ) from None
-            if content.strip():
-                yield entry.filename, content
+    names = [name for name in entry_names(fmu) if not name.endswith("/") and _may_tell(PurePosixPath(name))]
+    if len(names) > _MAX_FILES:
+        raise SpecError(f"{fmu}: has {len(names)} documents and sources, more than {_MAX_FILES}; {NAME_THEM}")
+    again = "copy or export the FMU again"
+    found = read_entries(fmu, sorted(names), _MAX_BYTES, smaller=NAME_THEM, again=again)
+    yield from ((name, content) for name, content in found if content.strip())
 
 
 def _may_tell(name: PurePosixPath) -> bool:

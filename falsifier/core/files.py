@@ -129,6 +129,12 @@ def absent(path: Path) -> str:
     return f"{path}: no such file"
 
 
+def seen_from_here(path: Path) -> str:
+    """Return a path as the user sees it: relative to the current folder if it is below."""
+    short = os.path.relpath(path)
+    return str(path) if short.startswith("..") else short
+
+
 def bundled(folder: str) -> Path:
     """Return the folder ``specs`` or ``fmus``: bundled with the package, or next to it in a checkout."""
     package = Path(__file__).resolve().parents[1]

@@ -1,18 +1,15 @@
 """What a problem names as context, and reading it: only for a language model or an engine that uses it."""
 
-import logging
 from dataclasses import replace
-from functools import lru_cache
-from os.path import relpath
 from pathlib import Path
 
 from falsifier.context.values import NOTHING, Context, Named
+from falsifier.core.files import seen_from_here
+from falsifier.errors import warn_once
 from falsifier.fmu import fmu_files
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.problem.spec import Spec
-
-_LOG = logging.getLogger(__name__)
 
 
 def named_context(source: ProblemSource, spec: Spec | None = None, path: Path | None = None) -> Named:
@@ -21,7 +18,7 @@ def named_context(source: ProblemSource, spec: Spec | None = None, path: Path | 
     if spec is None or path is None or NOTHING in source.context:
         return named
     stated = spec.context
-    shown = {name: _shown(path.parent / name) for name in stated.files}
+    shown = {name: seen_from_here(path.parent / name) for name in stated.files}
     return Named(
         tuple(dict.fromkeys((*shown.values(), *named.files))),
         named.fmu or stated.fmu,
@@ -54,17 +51,5 @@ def with_context(problem: Problem, *, is_told: bool = True) -> Problem:
         is_told=is_told,
     )
     for note in found.notes:
-        _say_once(note)
+        warn_once(note)
     return replace(problem, context=found)
-
-
-@lru_cache(maxsize=1000)
-def _say_once(note: str) -> None:
-    """Warn; a campaign reads the same files for each of its runs."""
-    _LOG.warning(note)
-
-
-def _shown(path: Path) -> str:
-    """Path as the user sees it: relative to here if it is below."""
-    short = relpath(path)
-    return str(path) if short.startswith("..") else short

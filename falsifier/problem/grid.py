@@ -4,16 +4,15 @@ All times are compared as fractions: in floating point 3 s is not a multiple of 
 """
 
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil
 
 from falsifier.core.experiment import MAX_STEPS, common_part, exact
 from falsifier.core.literals import digits
-from falsifier.errors import FormulaError, SpecError
+from falsifier.errors import SpecError
 from falsifier.problem.sections import FreeSection
-from falsifier.stl import Formula, parse
+from falsifier.stl import Formula
 
 # Number of intervals if the FMU specifies no step.
 _DEFAULT_INTERVALS = 1000
@@ -92,13 +91,10 @@ def choose_grid(
     return Grid(float(interval), reason)
 
 
-def formula_times(formulas: Iterable[str]) -> list[float]:
-    """Return the bounds in s of all windows; formulas that cannot be parsed have none."""
-    found: list[float] = []
-    for text in formulas:
-        with suppress(FormulaError):
-            found += _bounds(parse(text))
-    return found
+def formula_times(formulas: Iterable[Formula]) -> list[float]:
+    """Return the bounds in s of all windows."""
+    windows = (window for formula in formulas for window in formula.windows)
+    return [bound for window in windows for bound in (window.start, window.end)]
 
 
 def fitting_interval(formula: Formula, stop_time: float, **steps: float | None) -> float | None:
@@ -106,13 +102,9 @@ def fitting_interval(formula: Formula, stop_time: float, **steps: float | None) 
     if exact(formula.horizon()) > exact(stop_time):
         return None
     try:
-        return choose_grid(stop_time, times=_bounds(formula), **steps).interval
+        return choose_grid(stop_time, times=formula_times([formula]), **steps).interval
     except SpecError:
         return None
-
-
-def _bounds(formula: Formula) -> list[float]:
-    return [bound for window in formula.windows for bound in (window.start, window.end)]
 
 
 def _count(common: Fraction, wanted: Fraction, step_size: Fraction | None) -> int:
@@ -167,11 +159,10 @@ def check_steps(stop_time: float, period: float | None, *, key: str | None = Non
         raise SpecError(f"{named} {period:g} s {why}; {remedy}the smallest value is {smallest:g}", key=key)
 
 
-def default_freedom(formulas: Iterable[str], *, stop_time: float, step: float) -> FreeSection:
+def default_freedom(formulas: Iterable[Formula], *, stop_time: float, step: float) -> FreeSection:
     """Return limits wide enough for inputs that change several times within each window.
 
-    Formulas that cannot be parsed have no windows. The shortest piece is a multiple of the time grid's
-    step; all times are in s.
+    The shortest piece is a multiple of the time grid's step; all times are in s.
     """
     stop, grid = exact(stop_time), exact(step)
     window = smallest_window(formulas)
@@ -182,11 +173,7 @@ def default_freedom(formulas: Iterable[str], *, stop_time: float, step: float) -
     return FreeSection(max_control_points=max(1, stop // shortest), min_interval=float(shortest))
 
 
-def smallest_window(formulas: Iterable[str | Formula]) -> float | None:
+def smallest_window(formulas: Iterable[Formula]) -> float | None:
     """Return the length in s of the smallest window that is longer than a moment; None if there is none."""
-    lengths: list[float] = []
-    for formula in formulas:
-        with suppress(FormulaError):
-            parsed = parse(formula) if isinstance(formula, str) else formula
-            lengths += [w.end - w.start for w in parsed.windows if w.end > w.start]
-    return min(lengths, default=None)
+    windows = (window for formula in formulas for window in formula.windows)
+    return min((w.end - w.start for w in windows if w.end > w.start), default=None)

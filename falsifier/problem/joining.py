@@ -24,6 +24,7 @@ from falsifier.problem.shorthand import searching, stated_as
 from falsifier.problem.source import STL_NAME
 from falsifier.problem.spec import AnyRequirement, Spec, overlay, parse_spec
 from falsifier.problem.unit_check import defined_units, factor_and_offset
+from falsifier.stl import Formula
 
 # Maximum number of states or locals that are recorded if the FMU declares no outputs.
 _MAX_RECORDED = 50
@@ -202,7 +203,7 @@ def _experiment(
     layers: Sequence[ModelChanges],
     info: ModelInfo,
     changes: ModelChanges,
-    formulas_of: Callable[[float], Iterable[str]],
+    formulas_of: Callable[[float], Iterable[Formula]],
 ) -> tuple[Experiment, Grid | None]:
     """Return the experiment without outputs, and its grid if nobody stated the interval.
 

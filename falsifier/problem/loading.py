@@ -15,16 +15,15 @@ from os import PathLike
 from pathlib import Path
 from traceback import extract_tb
 
-from falsifier.context.values import Named
 from falsifier.core import named
 from falsifier.core.arguments import texts
-from falsifier.core.files import bundled
+from falsifier.core.files import bundled, seen_from_here
 from falsifier.core.literals import one_line, shell_word
 from falsifier.core.model import Interface
 from falsifier.errors import FalsifierError, SpecError, did_you_mean, setting, written
 from falsifier.fmu import is_package
 from falsifier.problem.context import named_context
-from falsifier.problem.joining import Joined, join, join_formula
+from falsifier.problem.joining import join, join_formula
 from falsifier.problem.problem import Problem
 from falsifier.problem.sections import ModelChanges, RequirementSection
 from falsifier.problem.shorthand import InputChoice, ParameterChoice, changes_from, requirement_of
@@ -166,8 +165,8 @@ def source_file(source: ProblemSource) -> Path | None:
     """Return the spec file, SSP package or imported module of a source; None if there is none."""
     if source.parts.kind == "python":
         file = Path(getattr(sys.modules.get(source.target.split(":")[1]), "__file__", None) or "")
-        here = Path.cwd()  # seen from it, as specs are, so that a project can be moved
-        return (file.relative_to(here) if file.is_relative_to(here) else file) if file.is_file() else None
+        # As specs are, so that a project can be moved.
+        return Path(seen_from_here(file)) if file.is_file() else None
     if source.parts.kind == "fmu":
         return Path(source.target) if is_package(source.target) else None
     return find_spec(source.target)[0]
@@ -187,8 +186,7 @@ def load_source(source: ProblemSource, *, searches: bool = True) -> Problem:
         if source.context:  # else it may name its own
             problem = replace(problem, named_context=named_context(source))
     else:
-        joined, context = _joined(source, searches=searches)
-        problem = replace(Problem.of(joined), named_context=context)
+        problem = _joined(source, searches=searches)
     problem = replace(problem.recording(source.record), source=source)
     if source.shortest_piece is not None:
         if source.parameterization == "fixed":
@@ -240,7 +238,7 @@ def _stating(fmu: str) -> str:
     return f"{add}, or write a spec with `falsifier init {shell_word(fmu)}`"
 
 
-def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
+def _joined(source: ProblemSource, *, searches: bool) -> Problem:
     """Join what a source names."""
     stated = None if source.stl is None else requirement_of(source.stl)
     if source.parts.kind == "fmu":
@@ -254,7 +252,7 @@ def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
             name=source.stl_name,
             searches=searches,
         )
-        return joined, named_context(source)
+        return replace(Problem.of(joined), named_context=named_context(source))
     path, requirement = find_spec(source.target)
     spec = read_spec(path)
     if requirement is None and path.stem in spec.requirements:
@@ -286,7 +284,7 @@ def _joined(source: ProblemSource, *, searches: bool) -> tuple[Joined, Named]:
         searches=searches,
         is_free=source.parameterization == "free" and source.shortest_piece is None,
     )
-    return joined, named_context(source, spec, path)
+    return replace(Problem.of(joined), named_context=named_context(source, spec, path))
 
 
 def _python_problem(source: ProblemSource) -> Problem:

@@ -105,12 +105,12 @@ def check_comparable(variable: Variable) -> None:
         )
 
 
-def section_formulas(sections: Iterable[AnyRequirement], stop_time: float) -> list[str]:
-    """Return the formulas of requirements, for the times in them; templates that do not fit have none."""
+def section_formulas(sections: Iterable[AnyRequirement], stop_time: float) -> list[Formula]:
+    """Return the formulas of requirements, for the times in them; what is wrong has none."""
     found = []
     for section in sections:
-        with suppress(SpecError):
-            found.append(section.expanded(section.stop_time or stop_time))
+        with suppress(SpecError, FormulaError):
+            found.append(parse(section.expanded(section.stop_time or stop_time)))
     return found
 
 

@@ -2,12 +2,10 @@
 
 import errno
 import fcntl
-import logging
 import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
 from io import BytesIO
 from itertools import count
 from pathlib import Path
@@ -21,9 +19,7 @@ from falsifier.core.files import check_seal, checksum, seal, write_whole
 from falsifier.core.literals import one_line, shell_word
 from falsifier.core.posix_files import lock_file
 from falsifier.core.trajectory import Trajectory
-from falsifier.errors import JournalError, MonitorError, first_fault, in_section, written
-
-_LOG = logging.getLogger(__name__)
+from falsifier.errors import JournalError, MonitorError, first_fault, in_section, warn_once, written
 
 TRAJECTORIES = "trajectories"
 # The file that makes a directory a campaign's, whose runs have directories of their own below it.
@@ -134,10 +130,8 @@ def _index(trajectory: Path) -> int:
     return int(trajectory.name.partition("-")[0])
 
 
-@cache
 def _tell_lost(path: Path, why: str) -> None:
-    """Tell it once, however often a command reads the file."""
-    _LOG.warning("%s is damaged: %s. It is left out, or simulated again where it is needed.", path, why)
+    warn_once(f"{path} is damaged: {why}. It is left out, or simulated again where it is needed.")
 
 
 def is_own_file(path: Path) -> bool:

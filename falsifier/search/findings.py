@@ -98,7 +98,7 @@ def inexpressible(problem: Problem, used: Parameterization) -> Finding | None:
     """
     formula, searched = problem.requirement.formula, searched_space(problem.space, used)
     experiment = problem.experiment
-    limits = default_freedom([str(formula)], stop_time=experiment.stop_time, step=experiment.output_interval)
+    limits = default_freedom([formula], stop_time=experiment.stop_time, step=experiment.output_interval)
     coarse = [r for r in searched.inputs if r.free is None and r.control_points < limits.max_control_points]
     if not coarse:
         return None

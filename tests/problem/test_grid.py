@@ -7,6 +7,8 @@ from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.problem.grid import check_steps, choose_grid, default_freedom, fitting_interval, formula_times
 from falsifier.problem.problem import Problem
+from falsifier.problem.requirement import section_formulas
+from falsifier.problem.sections import RequirementSection
 from falsifier.stl import parse
 from tests.fmu.fixtures import path as fmu_path
 from tests.problem.support import echo
@@ -80,7 +82,9 @@ def test_a_step_that_is_far_too_short_for_the_stop_time_is_an_error(
 
 
 def test_times_of_formulas_are_the_bounds_of_their_windows() -> None:
-    assert formula_times(["G[0,1] (F[0.5,2] (x > 0))", "not a formula ("]) == [0.0, 1.0, 0.5, 2.0]
+    texts = ("G[0,1] (F[0.5,2] (x > 0))", "not a formula (")
+    formulas = section_formulas([RequirementSection(formula=text) for text in texts], 10.0)
+    assert formula_times(formulas) == [0.0, 1.0, 0.5, 2.0]
 
 
 def test_a_stated_interval_that_does_not_fit_names_one_that_does() -> None:
@@ -124,13 +128,13 @@ def test_the_shortest_step_is_refused_in_words_and_half_of_it_confirms() -> None
         ("G (F[0,0.02] (y <= 1))", 50.0, 0.01, 1000, 0.05),  # never more than a thousand
         ("G (F[0,0.2] (y <= 1))", 1.0, 0.1, 10, 0.1),  # never shorter than the step
         ("G[2,2] (y <= 1)", 10.0, 0.01, 200, 0.05),  # a moment is no window
-        ("not a formula", 10.0, 20.0, 1, 20.0),
+        ("y <= 1", 10.0, 20.0, 1, 20.0),
     ],
 )
 def test_the_limits_follow_from_windows_step_and_stop_time(
     formula: str, stop_time: float, step: float, count: int, shortest: float
 ) -> None:
-    free = default_freedom([formula], stop_time=stop_time, step=step)
+    free = default_freedom([parse(formula)], stop_time=stop_time, step=step)
     assert (free.max_control_points, free.min_interval) == (count, shortest)
 
 

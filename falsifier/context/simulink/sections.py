@@ -7,10 +7,10 @@ from pathlib import Path, PurePosixPath
 from xml.etree.ElementTree import Element
 
 from falsifier.errors import SpecError
-from falsifier.fmu.description.archive import UNREADABLE, open_archive
+from falsifier.fmu.description.archive import entry_names, read_entries
 from falsifier.fmu.description.xml import read_xml
 
-_MAX_DEPTH = 200
+_MAX_DEPTH = 200  # of sections, and of parts that refer to each other
 _OPENING = re.compile(r"([\w.$:/+-]++)\s*+\{$")
 _STRING = re.compile(r'"((?:[^"\\]|\\.)*+)"$')
 _VALUE = re.compile(r"([\w.$:/+-]++)\s++(.*)$")
@@ -27,7 +27,6 @@ _SETTINGS = "simulink/configset"
 _MAX_PART_BYTES = 64 << 20
 # Only these are read; a package also contains pictures, histories and caches.
 _READ = (_DIAGRAM, _DEFAULTS, _STATEFLOW, _CHARTS, _SETTINGS, "simulink/systems/")
-_MAX_NESTING = 200
 # Far more than models have. Parts that refer twice to the next one could stand for billions of sections.
 _MAX_SECTIONS = 2_000_000
 _MAX_REFERENCES = 20_000
@@ -129,22 +128,10 @@ def read_parts(path: Path) -> dict[str, bytes]:
         ModelError: if it is not a zip archive, or a dangerous one.
         SpecError: naming the part that is damaged or too large.
     """
-    parts = {}
-    with open_archive(path) as archive:
-        for entry in archive.infolist():
-            name = entry.filename
-            if not name.lower().startswith(_READ) or not name.lower().endswith(".xml"):
-                continue
-            if entry.file_size > _MAX_PART_BYTES:
-                raise SpecError(
-                    f"{path}: {name} has {entry.file_size >> 20} MiB, more than {_MAX_PART_BYTES >> 20}; "
-                    "save the subsystem that matters as a model of its own"
-                )
-            try:
-                parts[name] = archive.read(entry)
-            except UNREADABLE as error:
-                raise SpecError(f"{path}: {name} is damaged ({error}); save the model again") from None
-    return parts
+    wanted = (name for name in entry_names(path) if name.lower().startswith(_READ))
+    names = [name for name in wanted if name.lower().endswith(".xml")]
+    smaller = "save the subsystem that matters as a model of its own"
+    return dict(read_entries(path, names, _MAX_PART_BYTES, smaller=smaller, again="save the model again"))
 
 
 class ModelPackage:
@@ -196,7 +183,7 @@ class ModelPackage:
         """Return the root section of the part that a reference stands for."""
         self._references += 1
         name = self._stems.get(stem, f"{stem}.xml")
-        if name in within or len(within) > _MAX_NESTING:
+        if name in within or len(within) > _MAX_DEPTH:
             raise SpecError(f"{self._shown}: {within[-1]}: refers to {name}, which contains it")
         if self._references > _MAX_REFERENCES:
             raise SpecError(f"{self._shown}: its parts refer to others more than {_MAX_REFERENCES:,} times")

@@ -3,7 +3,7 @@
 import shutil
 from pathlib import Path
 
-from falsifier.core.files import file_name
+from falsifier.core.files import file_name, write_whole
 from falsifier.counterexamples.export import tables
 from falsifier.counterexamples.export.components import write_components, write_package
 from falsifier.counterexamples.export.scripts import openmodelica_script, replay_script
@@ -40,20 +40,18 @@ def export_counterexample(
     if table.columns:
         files.append(tables.write_csv(table, directory / "input.csv", problem.model))
     if isinstance(problem.model, FmuModel):
-        # Next to the scripts, which then need nothing else of this machine.
-        files.append(shutil.copyfile(problem.model.path, directory / problem.model.path.name))
+        columns = tables.file_columns(table, problem.model)
+        files += [
+            # Next to the scripts, which then need nothing else of this machine.
+            shutil.copyfile(problem.model.path, directory / problem.model.path.name),
+            write_whole(directory / "replay.py", replay_script(problem, evaluation, columns)),
+            write_whole(
+                directory / "replay.mos", openmodelica_script(problem, start, has_inputs=bool(columns))
+            ),
+        ]
     if isinstance(problem.model, System):
         inside = {file.name: file for file in files if file.name in ("input.csv", "start_values.ssv")}
         target = directory / f"{file_name(problem.model.name)}.ssp"
         files.append(write_package(problem.model, problem.experiment.stop_time, inside, target))
         files += write_components(problem, candidate, directory)
-    columns = tables.file_columns(table, problem.model)
-    scripts = {
-        "replay.py": replay_script(problem, evaluation, columns),
-        "replay.mos": openmodelica_script(problem, start, has_inputs=bool(columns)),
-    }
-    for name, text in scripts.items():
-        if text is not None:
-            (directory / name).write_text(text, encoding="utf-8")
-            files.append(directory / name)
     return files

@@ -22,7 +22,7 @@ import tomlkit
 from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.files import file_name
+from falsifier.core.files import file_name, write_whole
 from falsifier.core.literals import one_line
 from falsifier.core.model import INTERFACE_TAGS, Variable
 from falsifier.core.trajectory import Trajectory
@@ -84,8 +84,8 @@ def write_components(problem: Problem, candidate: Candidate, directory: Path) ->
             files.append(tables.write_csv(inputs, folder / "input.csv", model))
         if outputs.columns:
             files.append(tables.write_csv(outputs, folder / "outputs.csv", model))
-            files.append(folder / f"{file_name(member.name)}.toml")
-            files[-1].write_text(_spec(member, outputs, start, problem), encoding="utf-8")
+            spec = _spec(member, outputs, start, problem)
+            files.append(write_whole(folder / f"{file_name(member.name)}.toml", spec))
     return files
 
 
@@ -206,12 +206,9 @@ def write_package(system: System, stop_time: float, resources: Mapping[str, Path
         _connectors(component, (*info.inputs, *info.outputs, *info.parameters))
     connections = SubElement(whole, f"{_SSD}Connections")
     for link in network.links:
-        _connection(connections, link, network)
+        _connection(connections, network, link.source, link.target, link.factor, link.offset)
     for name, meant in system.frame.outputs:
-        place = network.places[meant]
-        ends = {"startElement": network.members[place.member].name, "startConnector": place.name}
-        ends |= {"endConnector": name, "suppressUnitConversion": "true"}
-        SubElement(connections, f"{_SSD}Connection", ends)
+        _connection(connections, network, network.places[meant], Place(SYSTEM, name))
     SubElement(root, f"{_SSD}DefaultExperiment", {"startTime": "0.0", "stopTime": repr(stop_time)})
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as package:
         text = ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)
@@ -248,16 +245,15 @@ def _bindings(element: Element, system: System, files: Iterable[str]) -> None:
         element.append(bindings)
 
 
-def _connection(parent: Element, link: Link, network: Network) -> None:
-    source = link.source.member
-    attributes = {} if source == SYSTEM else {"startElement": network.members[source].name}
-    attributes |= {
-        "startConnector": link.source.name,
-        "endElement": network.members[link.target.member].name,
-        "endConnector": link.target.name,
-        "suppressUnitConversion": "true",
-    }
-    connection = SubElement(parent, f"{_SSD}Connection", attributes)
-    if (link.factor, link.offset) != (1.0, 0.0):
-        numbers = {"factor": repr(link.factor), "offset": repr(link.offset)}
+def _connection(
+    parent: Element, network: Network, source: Place, target: Place, factor: float = 1.0, offset: float = 0.0
+) -> None:
+    attributes = {}
+    for end, place in (("start", source), ("end", target)):
+        if place.member != SYSTEM:
+            attributes[f"{end}Element"] = network.members[place.member].name
+        attributes[f"{end}Connector"] = place.name
+    connection = SubElement(parent, f"{_SSD}Connection", attributes | {"suppressUnitConversion": "true"})
+    if (factor, offset) != (1.0, 0.0):
+        numbers = {"factor": repr(factor), "offset": repr(offset)}
         SubElement(connection, f"{_SSC}LinearTransformation", numbers)

@@ -37,14 +37,13 @@ Simulates a counterexample with FMPy only; writes outputs.csv and prints the row
 """
 
 
-def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str]) -> str | None:
-    """Python script that needs only FMPy; None if the model is not an FMU.
+def replay_script(problem: Problem, evaluation: Evaluation, inputs: Iterable[str]) -> str:
+    """Python script for a counterexample of an FMU, which needs only FMPy.
 
     ``inputs`` are the names of the columns of input.csv after the time.
     """
     model, verdict, experiment = problem.model, evaluation.verdict, problem.experiment
-    if not isinstance(model, FmuModel) or verdict is None:
-        return None
+    assert isinstance(model, FmuModel) and verdict is not None, "FMPy simulates FMUs"
     is_co_simulation = model.interface == "co-simulation"
     # FMPy uses the output interval as communication step. If the problem's step is smaller, the script
     # records at that step and keeps every n-th row.
@@ -127,12 +126,8 @@ def _mark_of(verdict: Verdict) -> str:
     return f"  <- {'violated' if verdict.breach else 'decided by'}: {one_line(part)}"
 
 
-def openmodelica_script(
-    problem: Problem, start: Mapping[str, float | str], *, has_inputs: bool
-) -> str | None:
-    """OpenModelica script, for an input.csv if there are inputs in it; None if the model is not an FMU."""
-    if not isinstance(problem.model, FmuModel):
-        return None
+def openmodelica_script(problem: Problem, start: Mapping[str, float | str], *, has_inputs: bool) -> str:
+    """OpenModelica script for the model of an FMU, and for an input.csv if there are inputs in it."""
     info = problem.info
     overrides = ",".join(f"{name}={text_of(value, info[name].kind)}" for name, value in start.items())
     flags = ["-csvInput=input.csv"] if has_inputs else []

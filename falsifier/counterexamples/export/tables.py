@@ -136,8 +136,7 @@ def write_json(start: Mapping[str, float | str], path: Path, model: Model) -> Pa
     for declared, elements in _by_declaration(model, [n for n in start if n not in texts]).items():
         values = [start[e] if e in start else model.info[e].start_number or 0.0 for e in elements]
         shown[declared] = values if len(values) > 1 else values[0]
-    path.write_text(json.dumps(shown, indent=2) + "\n", encoding="utf-8")
-    return path
+    return write_whole(path, json.dumps(shown, indent=2) + "\n")
 
 
 def text_of(value: float | str, kind: Kind) -> str:

@@ -7,11 +7,11 @@ import sys
 import zipfile
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
-from falsifier.errors import ModelError, ModelFileError, remedy
+from falsifier.errors import ModelError, ModelFileError, SpecError, remedy
 
 try:
     from lzma import LZMAError
@@ -49,7 +49,7 @@ WINDOWS = "x86_64-windows"
 _KINDS = {".ssp": "SSP package", ".slx": "Simulink file"}
 # What reading an entry of a damaged archive raises. RuntimeError stands for entries that are encrypted or
 # compressed by an unknown method, OSError also for damaged bzip2 data, ValueError for names in no encoding.
-UNREADABLE = (zipfile.BadZipFile, zlib.error, LZMAError, EOFError, OSError, RuntimeError, ValueError)
+_UNREADABLE = (zipfile.BadZipFile, zlib.error, LZMAError, EOFError, OSError, RuntimeError, ValueError)
 _FORBIDDEN_KINDS = {
     stat.S_IFLNK: "symbolic link",
     stat.S_IFIFO: "named pipe",
@@ -72,7 +72,7 @@ def file_hash(path: Path) -> str:
 
 
 @contextmanager
-def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+def _open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open an FMU, SSP package or Simulink file after checking its entries.
 
     Raises:
@@ -83,7 +83,7 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
         archive = zipfile.ZipFile(path)
     except FileNotFoundError:
         raise ModelError(f"{path}: no such file; correct the path") from None
-    except UNREADABLE as error:
+    except _UNREADABLE as error:
         what = _KINDS.get(path.suffix.lower(), "FMU")
         raise _damaged(f"{path}: not a readable {what}, which is a zip archive", error) from error
     with archive:
@@ -102,7 +102,7 @@ def read_entry(path: Path, name: str, first: int | None = None) -> bytes:
         ModelFileError: if the archive is damaged or rejected, or has no such file or a too large one.
         ModelError: if it cannot be read.
     """
-    with open_archive(path) as archive:
+    with _open_archive(path) as archive:
         try:
             size = archive.getinfo(name).file_size
             if first is None and size > _MAX_TEXT_BYTES:
@@ -116,8 +116,30 @@ def read_entry(path: Path, name: str, first: int | None = None) -> bytes:
             raise ModelFileError(
                 f"{path}: the archive contains no {name}, so it is not an FMU; export the model again"
             ) from None
-        except UNREADABLE as error:
+        except _UNREADABLE as error:
             raise _damaged(f"{path}: {name} is damaged", error) from error
+
+
+def read_entries(
+    path: Path, names: Iterable[str], largest: int, *, smaller: str, again: str
+) -> Iterator[tuple[str, bytes]]:
+    """Yield the names and contents of these files of an archive that a user named.
+
+    Raises:
+        SpecError: naming a file that has more bytes than the ``largest``, and what makes it ``smaller``, or
+            one that is damaged, and what writes it ``again``.
+        ModelError: as of ``read_entry``.
+    """
+    with _open_archive(path) as archive:
+        for name in names:
+            size = archive.getinfo(name).file_size
+            if size > largest:
+                raise SpecError(f"{path}: {name} has {size >> 20} MiB, more than {largest >> 20}; {smaller}")
+            try:
+                content = archive.read(name)
+            except _UNREADABLE as error:
+                raise SpecError(f"{path}: {name} is damaged ({error}); {again}") from None
+            yield name, content
 
 
 def extract(path: Path, folder: Path) -> None:
@@ -127,10 +149,10 @@ def extract(path: Path, folder: Path) -> None:
         ModelFileError: if the archive is damaged or rejected.
         OSError: if the machine has no room for it, or allows no files so large.
     """
-    with open_archive(path) as archive:
+    with _open_archive(path) as archive:
         try:
             archive.extractall(folder)
-        except UNREADABLE as error:
+        except _UNREADABLE as error:
             if isinstance(error, OSError) and remedy(error):  # the machine's fault and not the archive's
                 error.filename = f"{folder}, to which {path} is unpacked"
                 raise
@@ -146,7 +168,7 @@ def _damaged(what: str, error: Exception) -> ModelError:
 
 def entry_names(path: Path) -> tuple[str, ...]:
     """Return the names of all files in an FMU, with forward slashes."""
-    with open_archive(path) as archive:
+    with _open_archive(path) as archive:
         return tuple(archive.namelist())
 
 

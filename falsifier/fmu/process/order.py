@@ -40,17 +40,19 @@ class Order:
 
     def prepare(self, plan: Plan) -> bytes:
         """Return the request to prepare for a plan's simulations; SpecError as of ``own_steps``."""
-        network = self.network
+        network, experiment = self.network, plan.experiment
         coupling, signals, feeds = network.coupling, network.connected_outputs(), _feeds(network, plan)
         steps = any(m.interface == "co-simulation" or m.step is not None for m in network.members)
         # Solvers that exchange nothing stop at the output grid only.
         every = plan.every if steps or network.links else 1
-        sizes = (len(plan.parameters), len(plan.inputs), len(plan.outputs))
-        outputs = [(network.places[name], row) for row, name in enumerate(plan.outputs)]
+        sizes = (len(plan.parameters), len(plan.inputs), len(experiment.outputs))
+        outputs = [(network.places[name], row) for row, name in enumerate(experiment.outputs)]
         copies = [(signals[place], row) for place, row in outputs if place in signals]
         parts = [
-            encoding.integers(plan.samples, every, plan.pieces, *sizes, plan.tolerance is not None),
-            encoding.reals(plan.stop_time, plan.max_step, plan.tolerance or 0.0),
+            encoding.integers(
+                experiment.samples, every, plan.pieces, *sizes, experiment.tolerance is not None
+            ),
+            encoding.reals(experiment.stop_time, experiment.step, experiment.tolerance or 0.0),
             encoding.integers(coupling.method == "jacobi", coupling.max_rounds),
             encoding.reals(coupling.tolerance),
             encoding.integers(len(signals)),
@@ -78,10 +80,10 @@ def _feeds(network: Network, plan: Plan) -> dict[Place, bytes]:
 
 def _component(network: Network, plan: Plan, position: int, feeds: Mapping[Place, bytes]) -> bytes:
     number, signals = network.order[position], network.connected_outputs()
-    member, strings = network.members[number], network.of_member(number, plan.strings)
-    description = member.description
+    member, experiment = network.members[number], plan.experiment
+    strings, description = network.of_member(number, experiment.strings), member.description
     given = network.of_member(number, zip(plan.parameters, count()))
-    recorded = network.of_member(number, zip(plan.outputs, count()))
+    recorded = network.of_member(number, zip(experiment.outputs, count()))
     recorded = [(name, row) for name, row in recorded if Place(number, name) not in signals]
     inputs = [place.name for place in feeds if place.member == number]
     held = [name for name in inputs if _is_held(description, member.interface, name)]
@@ -89,9 +91,9 @@ def _component(network: Network, plan: Plan, position: int, feeds: Mapping[Place
     parameters = [name for name, _ in given]
     loop_end = dict(network.loops).get(position, 0)
     is_iterated = any(first <= position < last for first, last in network.loops)
-    own = own_steps(member, plan.max_step, plan.stop_time)
+    own = own_steps(member, experiment.step, experiment.stop_time)
     parts = [
-        encoding.reals(plan.tolerance or description.info.tolerance or _DEFAULT_TOLERANCE),
+        encoding.reals(experiment.tolerance or description.info.tolerance or _DEFAULT_TOLERANCE),
         encoding.integers(own, loop_end, is_iterated, len(strings)),
         *(encoding.integers(description.slots[n].reference) + encoding.text(value) for n, value in strings),
         encoding.ports(description, parameters),

@@ -70,7 +70,7 @@ def failure(
         text=reply.text,
         returned=f"returned {_status_name(reply.status)}",
         reached=f"t = {readable(reply.time)} s",
-        stop=f"{readable(plan.stop_time)} s",
+        stop=f"{readable(plan.experiment.stop_time)} s",
         step=f"{step:.6g}",
         remedy=_other_step(member, step, log),
         out_of_time=_out_of_time(plan),
@@ -109,7 +109,7 @@ def crash(plan: Plan, reached: float, what: str, details: str, log: tuple[str, .
 
 def _reached(plan: Plan, time: float) -> tuple[str, float | None]:
     """Return how far a simulation came, in words and in s, as its process says: it may be any number."""
-    if not 0.0 < time < plan.stop_time * (1.0 + 1e-9):
+    if not 0.0 < time < plan.experiment.stop_time * (1.0 + 1e-9):
         return "", None
     return f" at t = {readable(time)} s", time
 
@@ -151,7 +151,7 @@ def _status_name(status: int) -> str:
 
 def _out_of_time(plan: Plan) -> str:
     option = written("--time-limit, or time_limit in a spec", "time_limit")
-    if plan.has_limit:
+    if not plan.shares:
         return f"after the time limit of {plan.time_limit:g} s; slow models need a larger {option}"
     share = f"{plan.time_limit:g} s without another tenth of the simulated time"
     return f"after {share}; slow models need {option}"
@@ -173,7 +173,7 @@ def _titles(network: Network, positions: Sequence[str]) -> list[str]:
 
 def _string(network: Network, plan: Plan, reply: Reply) -> str:
     """Name the string parameter of a component at the position that a worker tells, and its value."""
-    strings = network.of_member(_member(network, reply), plan.strings)
+    strings = network.of_member(_member(network, reply), plan.experiment.strings)
     known = _is_position(reply.text) and int(reply.text) < len(strings)
     name, value = strings[int(reply.text)] if known else ("a string", "a text")
     return f"{name!r} to {value!r}"

@@ -11,6 +11,8 @@ from falsifier.errors import ModelError, SimulationError, did_you_mean
 from falsifier.fmu.description.model_description import Description
 
 _DEFAULT_TIME_LIMIT = 60.0
+# Without a limit of the user, each of so many shares of the simulated time may take as long as that.
+SHARES = 10
 # Numbers at the start of the memory; their positions are those of ``enum header`` in worker.h.
 HEADER = 8
 
@@ -20,32 +22,28 @@ class Plan:
     """What all simulations of a search have in common."""
 
     model: str  # name of the FMU or system
+    experiment: Experiment  # its outputs are in the order of their rows
     inputs: tuple[str, ...]  # names of the inputs that are set, in the order of their rows
     parameters: tuple[str, ...]  # names of the parameters and start values that are set
-    outputs: tuple[str, ...]  # names of the recorded variables, in the order of their rows
     units: Mapping[str, str]  # units of the outputs by name
     # Smallest and largest number of the types of inputs and parameters, by name; not of reals.
     limits: Mapping[str, tuple[float, float]]
-    times: NDArray[np.float64]  # the output grid in s
+    times: NDArray[np.float64]  # the output grid in s, made once
     every: int  # communication steps per output interval (co-simulation)
     pieces: int  # maximum number of pieces of an input, see ``Signal.pieces``
-    max_step: float  # communication step in s, also the maximum of the solver (model exchange)
-    tolerance: float | None  # relative tolerance; None for the model's default
-    time_limit: float  # maximum wall-clock time of one simulation in s
-    # Whether that is for the whole simulation; else for each tenth of the simulated time, so that slow models
-    # are simulated, and those that hang are ended.
-    has_limit: bool
-    strings: tuple[tuple[str, str], ...]  # names and values of string parameters
 
     @property
-    def stop_time(self) -> float:
-        """Stop time in s."""
-        return float(self.times[-1])
+    def time_limit(self) -> float:
+        """Maximum wall-clock time in s of one simulation, or of a share of it."""
+        return self.experiment.time_limit or _DEFAULT_TIME_LIMIT
 
     @property
-    def samples(self) -> int:
-        """Number of points of the output grid."""
-        return len(self.times)
+    def shares(self) -> int:
+        """How many shares of the simulated time may each take so long; 0 if the user limits the whole.
+
+        So slow models are simulated, and those that hang are ended.
+        """
+        return SHARES if self.experiment.time_limit is None else 0
 
     @property
     def given(self) -> int:
@@ -90,19 +88,14 @@ def make_plan(
             raise ModelError(f"{model}: {name!r} cannot be set to a text: {reason}")
     return Plan(
         model=model,
+        experiment=experiment,
         inputs=inputs,
         parameters=parameters,
-        outputs=experiment.outputs,
         units={name: variables[name].unit for name in experiment.outputs if variables[name].unit},
         limits={n: limits for n in (*inputs, *parameters) if (limits := variables[n].type_limits)},
         times=experiment.times,
         every=round(experiment.output_interval / experiment.step),
         pieces=pieces,
-        max_step=experiment.step,
-        tolerance=experiment.tolerance,
-        time_limit=experiment.time_limit or _DEFAULT_TIME_LIMIT,
-        strings=experiment.strings,
-        has_limit=experiment.time_limit is not None,
     )
 
 

@@ -128,7 +128,7 @@ def simulate(
     pieces = 1 << (max(map(len, inputs.values()), default=1) - 1).bit_length()
     plan = _plan(order, experiment, tuple(inputs), tuple(parameters), pieces)
     outputs, log = REGISTRY.runner(order).simulate(plan, given_values(plan, inputs, parameters))
-    columns = dict(zip(plan.outputs, outputs, strict=True))
+    columns = dict(zip(experiment.outputs, outputs, strict=True))
     if not np.isfinite(outputs).all():
         check_finite(plan.model, plan.times, columns, hint="; omit it if no formula names it")
     return Trajectory(plan.times, columns, plan.units, log)

@@ -16,7 +16,7 @@ from falsifier.fmu.description.libraries import HOW_TO_INSTALL
 from falsifier.fmu.process.connection import QUICK_SECONDS, Garbled, Reply, Request, Where, receive, send
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
-from falsifier.fmu.process.plan import HEADER, Plan
+from falsifier.fmu.process.plan import HEADER, SHARES, Plan
 from falsifier.fmu.process.rights import Told, read_told
 from falsifier.fmu.process.start import COMPLETE, RUNNING, SIMULATED, Started
 from falsifier.fmu.process.workplace import Workplace
@@ -35,8 +35,6 @@ REUSES: tuple[Reuse, ...] = get_args(Reuse)
 
 # The worker checks the time limit itself; if it has not replied this long after it, it hangs and is killed.
 GRACE_SECONDS = 0.1
-# Without a limit of the user, each of so many shares of the simulated time may take as long as the default.
-SHARES = 10
 # How often to look how far a simulation is; from when on that is told.
 _LOOKING_SECONDS, _LONG_SECONDS = 1.0, 3.0
 
@@ -60,12 +58,12 @@ class Patience:
     """How long to wait for one simulation."""
 
     def __init__(self, plan: Plan) -> None:
-        self._plan = plan
+        self._model = plan.model
         self._started = time.monotonic()
         self._limit = plan.time_limit + GRACE_SECONDS
         self._deadline = self._started + self._limit
-        self._shares = 0 if plan.has_limit else SHARES
-        self._next = plan.stop_time / SHARES
+        self._stop_time, self._shares = plan.experiment.stop_time, plan.shares
+        self._next = self._stop_time / SHARES
 
     @property
     def seconds(self) -> float:
@@ -82,12 +80,12 @@ class Patience:
         if self._shares and reached >= self._next:
             self._shares -= 1
             self._deadline = now + self._limit
-            self._next = reached + self._plan.stop_time / SHARES
+            self._next = reached + self._stop_time / SHARES
         if now >= self._deadline:
             raise TimeoutError
         if now - self._started > _LONG_SECONDS and math.isfinite(reached):
             for listener in _LISTENERS:
-                listener(self._plan.model, min(max(reached, 0.0), self._plan.stop_time), self._plan.stop_time)
+                listener(self._model, min(max(reached, 0.0), self._stop_time), self._stop_time)
 
 
 class Worker(Started):
@@ -146,7 +144,7 @@ class Worker(Started):
 
     def prepare(self, plan: Plan, limit: float) -> Reply:
         """Let the worker look up a plan's variables; errors as for ``load``."""
-        self.memory.fit(HEADER + plan.given + len(plan.outputs) * plan.samples)
+        self.memory.fit(HEADER + plan.given + len(plan.experiment.outputs) * plan.experiment.samples)
         send(self.program, Request.PREPARE, text(self.place) + self._order.prepare(plan))
         reply = self.receive(limit)
         if reply.is_done:
@@ -157,8 +155,7 @@ class Worker(Started):
         """Simulate once with these numbers; errors as for ``load``."""
         self.memory.write(given, HEADER)
         self.memory.write(np.zeros(1), COMPLETE)
-        shares = 0 if plan.has_limit else SHARES
-        send(self.program, Request.SIMULATE, reals(plan.time_limit) + integers(shares))
+        send(self.program, Request.SIMULATE, reals(plan.time_limit) + integers(plan.shares))
         started = time.perf_counter()
         patience = Patience(plan)
         polling = QUICK_SECONDS if self._is_quick else 0.0
@@ -176,9 +173,10 @@ class Worker(Started):
 
     def outputs(self, plan: Plan) -> NDArray[np.float64]:
         """Return what the last simulation has recorded, shape (outputs, samples)."""
-        found = np.empty(len(plan.outputs) * plan.samples)
+        outputs, samples = len(plan.experiment.outputs), plan.experiment.samples
+        found = np.empty(outputs * samples)
         self.memory.read(found, HEADER + plan.given)
-        return found.reshape(len(plan.outputs), plan.samples)
+        return found.reshape(outputs, samples)
 
     def receive(self, limit: float, polling: float = 0.0) -> Reply:
         """Wait for a reply; see ``connection.receive``."""
@@ -196,7 +194,7 @@ class Worker(Started):
     @property
     def is_complete(self) -> bool:
         """Whether the worker says that the last simulation has reached its end, and recorded all outputs."""
-        return self.plan is not None and self.memory.header(COMPLETE) == self.plan.stop_time
+        return self.plan is not None and self.memory.header(COMPLETE) == self.plan.experiment.stop_time
 
     @property
     def _position(self) -> int:

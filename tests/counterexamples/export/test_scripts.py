@@ -58,7 +58,6 @@ def test_the_replay_script_needs_fmpy_only_and_writes_the_trajectory(tmp_path: P
 def test_the_replay_script_parts_long_names(capsys: pytest.CaptureFixture[str]) -> None:
     problem = load_problem("AT1")
     script = replay_script(problem, evaluate(problem, problem.space.admit(AT_INPUTS["held"])), [])
-    assert script is not None
     names, table = ["time", "car.wheels.left.speed"], np.zeros(3, [("time", float)])
     end = re.sub(r"(?m)^shown = .*$", f"shown = {names}", script[script.index("shown = ") :])
     exec(end, {"result": table, "columns": dict.fromkeys(names, table["time"])})
@@ -75,7 +74,6 @@ def test_the_replay_script_tells_a_value_from_a_limit_that_is_near(
     values = {**evaluation.verdict.values, "speed": 1000000.001}
     near = replace(evaluation, verdict=replace(evaluation.verdict, robustness=-0.0005, values=values))
     script = replay_script(problem, near, [])
-    assert script is not None
     speed = np.full(3, 1000000.001)
     table = np.zeros(3, [("time", float)])
     exec(
@@ -93,7 +91,6 @@ def test_the_replay_script_shows_what_broke_and_not_the_condition_that_decided()
     verdict = evaluation.verdict
     assert verdict is not None and verdict.predicate == "speed >= 80"
     script = replay_script(problem, evaluation, ["throttle", "brake"])
-    assert script is not None
     told = [
         script.index(part) for part in ("rpm <= 100 was violated from ", "while speed >= 80 held", "Recorded")
     ]
@@ -212,7 +209,7 @@ def test_inputs_that_fmpy_cannot_take_end_the_script(
     if name == "Lag_2":
         problem = Problem.from_fmu(fmu, "G (y <= 1)", inputs={"time": (0.0, 1.0)})
         script = replay_script(problem, evaluate(problem, somewhere(problem)), ["time"])
-        assert script is not None and f"\nsys.exit({told!r})\n" in script
+        assert f"\nsys.exit({told!r})\n" in script
 
 
 def test_the_replay_script_says_on_which_platforms_fmpy_runs_the_fmu() -> None:
@@ -221,7 +218,7 @@ def test_the_replay_script_says_on_which_platforms_fmpy_runs_the_fmu() -> None:
     assert not list(replay_notes(problem.model))
     for name, platform in (("Lag_2", "x86_64-linux"), ("win64/Lag_2", "x86_64-windows")):
         model = FmuModel(fmu_path(name))
-        script = str(replay_script(replace(problem, model=model), evaluation, ["u"]))
+        script = replay_script(replace(problem, model=model), evaluation, ["u"])
         assert f"FMPy runs this FMU on {platform}, for" in script.partition("import")[0]
     assert "x86_64-windows, for" in (note := "".join(replay_notes(model)))
     assert note.endswith("this is x86_64-linux, where it needs a program wine64")
@@ -257,7 +254,6 @@ def test_the_openmodelica_script_has_the_experiment_the_inputs_and_the_start_val
     problem = load_problem("AT1")
     problem = replace(problem, experiment=replace(problem.experiment, tolerance=1e-9))
     script = openmodelica_script(problem, {"finalDrive": 3.25}, has_inputs=True)
-    assert script is not None
     for part in (
         'loadFile("ArchComp/package.mo")',
         "simulate(ArchComp.AT, startTime=0, stopTime=50.0, numberOfIntervals=5000, tolerance=1e-09,",
@@ -274,7 +270,7 @@ def test_where_a_smaller_step_is_simulated_every_so_many_rows_are_kept(tmp_path:
     problem = replace(problem, experiment=replace(problem.experiment, step_size=0.002))
     evaluation = evaluate(problem, problem.space.admit(AT_INPUTS["constant"]))
     script = replay_script(problem, evaluation, [])
-    assert script is not None and "output_interval=0.002," in script
+    assert "output_interval=0.002," in script
     assert ")[::5]" in script
 
 

@@ -28,7 +28,7 @@ class Clock:
 def lasts(clock: Clock, waiting: Patience, pace: float) -> float:
     """Seconds after which a simulation at this pace, in simulated seconds per second, is given up or ends."""
     reached = 0.0
-    while reached < PLAN.stop_time:
+    while reached < PLAN.experiment.stop_time:
         clock.now += waiting.seconds
         reached = pace * clock.now
         try:
