@@ -89,18 +89,11 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
     drawn = _with_own_ranges(problem, evaluation.candidate)
     files = _written(problem, drawn, evaluation, out) if out else []
     verdict = "violated" if evaluation.violated else "not violated"
-    lines = [
-        f"{problem.name}: {verdict}{' by these inputs' if inputs else ''} ({evaluation.seconds:.2f} s)",
-        f"  requirement    {problem.requirement.formula}",
-        *fact_lines(evaluation_facts(drawn, evaluation)),
-        *([f"  files          {', '.join(map(str, files))}"] if files else []),
-    ]
-    content = {
-        **problem_json(problem),
-        **evaluation_json(evaluation),
-        "files": list(map(str, files)),
-    }
-    text = "\n".join(map(one_line, lines))
+    head = f"{problem.name}: {verdict}{' by these inputs' if inputs else ''} ({evaluation.seconds:.2f} s)"
+    facts = [("requirement", str(problem.requirement.formula)), *evaluation_facts(drawn, evaluation)]
+    facts += [("files", ", ".join(map(str, files)))] if files else []
+    content = {**problem_json(problem), **evaluation_json(evaluation), "files": list(map(str, files))}
+    text = "\n".join(map(one_line, [head, *fact_lines(facts)]))
     is_lost = out is not None and len(files) < len(_FILES)
     code = FAILED if is_lost else 1 if evaluation.violated else 0
     conclude(as_shown(text, content, as_json=as_json), code)
