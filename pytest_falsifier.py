@@ -442,20 +442,20 @@ def _message(item: pytest.Item, checked: "Checked", database: "Database") -> str
     except OSError as error:
         drawn = f"cannot be written: {error.strerror}"
     how = "stored counterexample" if checked.result is None else "counterexample found by a search"
-    lines = [
-        f"{problem.name} is violated by a {how}",
-        *fact_lines(broken_facts(found.evaluation.verdict)),
-        f"  requirement    {problem.requirement.formula}",
-        f"  confirmed      {found.reason}",
-        *fact_lines(candidate_facts(found.evaluation.candidate, problem.space)),
-        f"  picture        {drawn}",
+    facts = [
+        *broken_facts(found.evaluation.verdict),
+        ("requirement", str(problem.requirement.formula)),
+        ("confirmed", found.reason),
+        *candidate_facts(found.evaluation.candidate, problem.space),
+        ("picture", drawn),
     ]
     if checked.file is not None:
-        lines.append(f"  stored         {_short(checked.file)}")
-        lines.append(f"  replay with    {_command(item, checked.file, database)}")
+        facts.append(("stored", str(_short(checked.file))))
+        facts.append(("replay with", _command(item, checked.file, database)))
     if checked.not_stored:
-        lines.append(f"  not stored     {checked.not_stored}")
-    return "\n".join([*lines, "", explain(problem, found.evaluation).text])
+        facts.append(("not stored", checked.not_stored))
+    head, why = f"{problem.name} is violated by a {how}", explain(problem, found.evaluation).text
+    return "\n".join([head, *fact_lines(facts), "", why])
 
 
 def _command(item: pytest.Item, file: Path, database: "Database") -> str:

@@ -17,6 +17,7 @@ from falsifier.counterexamples.store import to_store
 from falsifier.testing import lag_problem
 from pytest_falsifier import UnconfirmedWarning, UntestedError, UntestedWarning, _tell_doubts
 from tests.command import ROOT, Done, forked
+from tests.fmu.fixtures import path as fixture
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
 from tests.problems import broken
 from tests.stepped import euler_problem
@@ -149,8 +150,8 @@ def test_specs_of_one_name_have_their_own_counterexamples_and_what_is_unused_is_
     for folder, limit in (("a", 120), ("b", 119), ("c", 500)):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "car.toml").write_text(SPEC.replace("<= 120", f"<= {limit}"))
-    settings = ("falsifier_engine=corners", "falsifier_budget=10")
-    options = ("--falsifier", "-o", settings[0], "-o", settings[1], "-k", "not impossible")
+    settings = ("-ofalsifier_engine=corners", "-ofalsifier_budget=10")
+    options = ("--falsifier", *settings, "-k", "not impossible")
     first = run_pytest(tmp_path, *options)
     assert "2 failed, 1 passed" in first.out and "stored counterexample" not in first.out, first.out
     stored = sorted((tmp_path / "counterexamples").rglob("*.json"))
@@ -238,7 +239,7 @@ def test_lists_of_packages_and_files_that_are_not_asked_for_are_no_errors(reposi
 def test_hostile_specs_and_fmus_are_failures_of_one_line(tmp_path: Path) -> None:
     for name in ("fmus", "specs"):
         (tmp_path / name).mkdir()
-    shutil.copy(ROOT / "tests" / "fixtures" / "fmus" / "Misdeeds_2.fmu", tmp_path / "fmus")
+    shutil.copy(fixture("Misdeeds_2"), tmp_path / "fmus")
     (tmp_path / "specs" / "hostile.toml").write_text(HOSTILE)
     (tmp_path / "specs" / "deep.toml").write_text(f"a = {'[' * 100_000}{']' * 100_000}")
     (tmp_path / "specs" / "long.toml").write_text(f"a = {'9' * 5000}")

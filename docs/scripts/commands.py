@@ -9,6 +9,7 @@ from inspect import cleandoc
 from typing import Any
 
 import click
+from tables import table
 
 from falsifier.cli import cli
 from falsifier.cli.command import OPTION_GROUPS, option_groups
@@ -44,7 +45,7 @@ def _name(context: click.Context) -> str:
 def _listed(contexts: list[click.Context]) -> str:
     """A table of the commands, and one of the options by heading."""
     rows = [
-        f"| [`{_name(c)}`](#{_name(c).replace(' ', '-')}) | {c.command.get_short_help_str(200)} |"
+        (f"[`{_name(c)}`](#{_name(c).replace(' ', '-')})", c.command.get_short_help_str(200))
         for c in contexts
     ]
     users: dict[str, list[str]] = {}
@@ -56,22 +57,11 @@ def _listed(contexts: list[click.Context]) -> str:
     own = sorted(users.keys() - grouped)
     headings = {**OPTION_GROUPS, "Of single commands": own}
     options = [
-        f"| {heading} | {', '.join(f'`{name}`' for name in names if name in users)} |"
+        (heading, ", ".join(f"`{name}`" for name in names if name in users))
         for heading, names in headings.items()
     ]
-    return "\n".join(
-        [
-            "| command | does |",
-            "| --- | --- |",
-            *rows,
-            "",
-            f"{len(users)} options; each means the same in every command that has it.",
-            "",
-            "| heading | options |",
-            "| --- | --- |",
-            *options,
-        ]
-    )
+    count = f"{len(users)} options; each means the same in every command that has it."
+    return "\n\n".join([table(("command", "does"), rows), count, table(("heading", "options"), options)])
 
 
 def _described(context: click.Context) -> Iterator[str]:

@@ -74,7 +74,7 @@ def _keys(section: str) -> str:
         (f"`{key}`", _type(said), "yes" if key in required else "", _meaning(said))
         for key, said in properties.items()
     ]
-    return _table(("key", "value", "required", "meaning"), rows)
+    return table(("key", "value", "required", "meaning"), rows)
 
 
 def _meaning(said: Mapping[str, Any]) -> str:
@@ -120,7 +120,7 @@ def _engines(_: str | None) -> str:
         )
         for name, engine in ENGINES.items()
     ]
-    return _table(("engine", "what it does", "needs"), rows)
+    return table(("engine", "what it does", "needs"), rows)
 
 
 def _variants(_: str | None) -> str:
@@ -131,10 +131,11 @@ def _variants(_: str | None) -> str:
         (meaning, *("x" if variant.has(part) else "" for variant in VARIANTS.values()))
         for part, meaning in _PARTS.items()
     ]
-    return _table(("part", *names), rows)
+    return table(("part", *names), rows)
 
 
-def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+def table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    """Return a table in Markdown."""
     lines = [head, tuple("---" for _ in head), *rows]
     return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
 

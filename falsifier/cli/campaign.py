@@ -6,6 +6,7 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any, NoReturn
@@ -63,9 +64,7 @@ Exit codes: 0 all runs finished, 2 wrong usage or spec, 3 some runs failed or we
     multiple=True, default=f"{options.DEFAULT_PARAMETERIZATION}; with --suite {PROTOCOL_PARAMETERIZATION}"
 )
 @options.engine_option(multiple=True)
-@llm_options.llm_option(multiple=True)
-@llm_options.variant_option(multiple=True)
-@llm_options.asking_options
+@partial(llm_options.llm_options, multiple=True)
 @llm_options.context_option
 @options.count_option(
     "--runs", "Number of runs per requirement and method, each with its own seed.", default=10

@@ -214,22 +214,23 @@ def _shrink(
         "at_most": shrunk.at_most,
         "spent": {"simulations": shrunk.simulations},
     }
-    lines = [case.text] if case.is_miss else []
     end = "nothing simpler found nearby" if shrunk.minimal else "the budget is used up"
     done = "not shrunk" if in_one_line(found.candidate) == in_one_line(original.candidate) else "shrunk"
-    lines.append(f"{problem.name}: {done} with {counted(shrunk.simulations, 'simulation')}; {end}")
+    head = f"{problem.name}: {done} with {counted(shrunk.simulations, 'simulation')}; {end}"
+    facts = list[tuple[str, str]]()
     if confirmation is not None:
         simpler = "this simpler input violates the requirement: " if case.is_miss else ""
-        lines.append(f"  {confirmation.outcome:<13}  {simpler}{confirmation.reason}")
-        lines += fact_lines(broken_facts(confirmation.evaluation.verdict))
+        facts.append((confirmation.outcome, f"{simpler}{confirmation.reason}"))
+        facts += broken_facts(confirmation.evaluation.verdict)
     share = "a tenth more than before" if case.is_miss else "half of the original's"
     allowed = "" if found.violated and case.is_miss else f"; up to {signed(shrunk.at_most)} was allowed"
     allowed += f", {share}; --at-most changes it" if allowed and at_most is None else ""
-    lines.append(f"  robustness     {signed(found.robustness)}{allowed}")
-    lines += fact_lines(candidate_facts(found.candidate, problem.space))
+    facts.append(("robustness", f"{signed(found.robustness)}{allowed}"))
+    facts += candidate_facts(found.candidate, problem.space)
     if confirmation is not None and case.changes(problem):
-        lines.append("  note           not of the run's FMU and spec: its reports show the original")
-    lines += [f"  files          {', '.join(map(str, paths))}"] if paths else []
+        facts.append(("note", "not of the run's FMU and spec: its reports show the original"))
+    facts += [("files", ", ".join(map(str, paths)))] if paths else []
+    lines = [*([case.text] if case.is_miss else []), head, *fact_lines(facts)]
     return list(map(one_line, lines)), content
 
 
@@ -268,7 +269,7 @@ def _map(case: Case, run: Path, rights: Mapping[str, Any], budget: int, out: Pat
         "persistence": [{"size": size, "share": share} for size, share in found.persistence],
         "rank_correlations": dict(zip(labels, found.influences, strict=True)),
     }
-    told = [f"{problem.name}: {found.text}", *(f"  picture        {file}" for file in drawn)]
+    told = [f"{problem.name}: {found.text}", *fact_lines(("picture", str(file)) for file in drawn)]
     return [*_about(case, problem, run), *told], content
 
 

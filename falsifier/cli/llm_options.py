@@ -84,14 +84,10 @@ def connection_options(command: Function) -> Function:
     )
 
 
-def asking_options(command: Function) -> Function:
-    """Add how to ask a language model for candidates, whichever it is."""
-    return add(command, connection_options, anonymous_option)
-
-
-def llm_options(command: Function) -> Function:
-    """Add which language model to ask, and how."""
-    return add(command, llm_option(), variant_option(), asking_options)
+def llm_options(command: Function, *, multiple: bool = False) -> Function:
+    """Add which language model to ask, or which several, and how."""
+    chosen = llm_option(multiple=multiple), variant_option(multiple=multiple)
+    return add(command, *chosen, connection_options, anonymous_option)
 
 
 def name_and_effort(text: str) -> tuple[str, str | None]:

@@ -108,8 +108,7 @@ def _write_arch_comp(directory: Path, path: Path) -> None:
     exported = export(finished)
     for label, text in exported.items():
         own = path if len(exported) == 1 else path.with_stem(f"{path.stem}-{file_name(label)}")
-        if own.exists():
-            files.check_out(own, begins=_ARCH_COMP)
+        files.check_out(own, begins=_ARCH_COMP)
         files.write_named(own, text)
 
 

@@ -60,7 +60,7 @@ def check(*, budget: int, as_json: bool, **given: Any) -> None:
     lines += [f"not searched: {text}" for text in held if text]
     lines += [line for finding in findings if finding.kind != "invalid" for line in _lines(finding)]
     lines.append(f"{counted(len(findings), 'finding')}" if findings else "nothing found")
-    conclude("\n".join(lines), code)
+    conclude("\n".join(map(one_line, lines)), code)
 
 
 def _problem_line(problem: Problem) -> str:
@@ -75,9 +75,8 @@ def _problem_line(problem: Problem) -> str:
 
 
 def _lines(finding: LintFinding) -> list[str]:
-    head = f"{finding.requirement}: {finding.kind}: {one_line(finding.text)}"
     place = [f"  in      {finding.part}"] if finding.part else []
-    return [head, *place, f"  to do   {finding.advice}"]
+    return [f"{finding.requirement}: {finding.kind}: {finding.text}", *place, f"  to do   {finding.advice}"]
 
 
 @command()

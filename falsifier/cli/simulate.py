@@ -18,10 +18,9 @@ from falsifier.core.ranges import InputRange, ParameterRange
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
 from falsifier.core.words import readable
-from falsifier.counterexamples.case import recorded_inputs
+from falsifier.counterexamples.case import read_known
 from falsifier.errors import SimulationError
 from falsifier.evaluation.evaluate import Evaluation, simulate as simulate_inputs
-from falsifier.evaluation.input_file import read_inputs
 from falsifier.fmu import is_solved
 from falsifier.problem.joining import rights_notes, unit_notes
 from falsifier.problem.loading import load_source
@@ -49,17 +48,17 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
     Exit codes: 0 not violated, 1 violated, 2 wrong usage or spec, 3 the simulation failed.
     """
     source, given = _without_numbers(stated := problem_source(options))
-    is_table = place is not None and place.suffix.lower() == ".csv"
-    stored = Candidate({}) if place is None or is_table else recorded_inputs(place, source.name)
     problem = load_source(source, searches=False)
     for note in (*problem.info.notes, *rights_notes(problem.model)):
         warn(note)
     with closing(problem.model):
         inputs = {v.name for v in problem.info.inputs}
         given |= {n: problem.parameters[n] for n in source.changes.parameters if n in problem.parameters}
-        read = _read(place, problem) if place is not None and is_table else {}
+        read, file_notes = (Candidate({}), []) if place is None else read_known(place, problem)
+        for note in file_notes:
+            warn(f"{place}: {note}")
         constant = {n: Signal((0.0,), (value,), "constant") for n, value in given.items() if n in inputs}
-        signals = {**read, **stored.signals, **constant}
+        signals = {**read.signals, **constant}
         held = {n: (value, value) for n, value in given.items() if n in problem.info}
         for note in unit_notes(problem.model, held):
             warn(note)
@@ -70,7 +69,7 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         for name, signal in signals.items():
             if note := _unseen(problem, name, signal):
                 warn(note)
-        known = {*signals, *stored.parameters, *given}
+        known = {*signals, *read.parameters, *given}
         if known and (kept := [n for n in problem.space.names if n not in known]):
             warn(f"no values given for {', '.join(kept)}: kept at the model's start value")
         if inputs and not known:
@@ -84,24 +83,17 @@ def simulate(*, place: Path | None, out: Path | None, as_json: bool, **options: 
         typed = stated.changes.parameters
         strings = {v.name for v in problem.info.variables if v.kind == "string"}
         texts = {n: t for n in strings & numbers.keys() if isinstance(t := typed[n].value, str)}
-        evaluation = simulate_inputs(problem, signals, {**stored.parameters, **numbers, **texts})
+        evaluation = simulate_inputs(problem, signals, {**read.parameters, **numbers, **texts})
     if evaluation.verdict is None:
         raise SimulationError(f"{problem.name}: the simulation {evaluation.outcome}")
     drawn = _with_own_ranges(problem, evaluation.candidate)
     files = _written(problem, drawn, evaluation, out) if out else []
     verdict = "violated" if evaluation.violated else "not violated"
-    lines = [
-        f"{problem.name}: {verdict}{' by these inputs' if inputs else ''} ({evaluation.seconds:.2f} s)",
-        f"  requirement    {problem.requirement.formula}",
-        *fact_lines(evaluation_facts(drawn, evaluation)),
-        *([f"  files          {', '.join(map(str, files))}"] if files else []),
-    ]
-    content = {
-        **problem_json(problem),
-        **evaluation_json(evaluation),
-        "files": list(map(str, files)),
-    }
-    text = "\n".join(map(one_line, lines))
+    head = f"{problem.name}: {verdict}{' by these inputs' if inputs else ''} ({evaluation.seconds:.2f} s)"
+    facts = [("requirement", str(problem.requirement.formula)), *evaluation_facts(drawn, evaluation)]
+    facts += [("files", ", ".join(map(str, files)))] if files else []
+    content = {**problem_json(problem), **evaluation_json(evaluation), "files": list(map(str, files))}
+    text = "\n".join(map(one_line, [head, *fact_lines(facts)]))
     is_lost = out is not None and len(files) < len(_FILES)
     code = FAILED if is_lost else 1 if evaluation.violated else 0
     conclude(as_shown(text, content, as_json=as_json), code)
@@ -115,14 +107,6 @@ def _without_numbers(source: ProblemSource) -> tuple[ProblemSource, dict[str, fl
     others = {name: section for name, section in stated.items() if name not in numbers}
     changes = source.changes.model_copy(update={"parameters": others})
     return source.model_copy(update={"changes": changes}), numbers
-
-
-def _read(file: Path, problem: Problem) -> dict[str, Signal]:
-    """Read the file of inputs; say on stderr what of it is not used, or kept after its end."""
-    found = read_inputs(file, problem.info)
-    for note in found.notes(problem.experiment.stop_time):
-        warn(f"{file}: {note}")
-    return dict(found.signals)
 
 
 def _unseen(problem: Problem, name: str, signal: Signal) -> str:

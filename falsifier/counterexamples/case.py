@@ -214,19 +214,11 @@ def _chosen(place: Path, described: Manifest, requirement: str | None) -> str:
 def known_inputs(place: Path, problem: Problem) -> Fitted:
     """Read known inputs, and fit them to a problem's search space.
 
-    The place is a CSV file of inputs, a counterexample file, or a run directory, of which the evaluation with
-    the smallest robustness is taken.
-
     Raises:
-        SpecError: if the place is none of these, or the run simulated nothing with success.
+        SpecError: if there are none; see ``read_known``.
         CandidateError: naming the place and what does not fit the search space.
     """
-    notes: list[str] = []
-    if place.suffix.lower() == ".csv" and not place.is_dir():
-        table = read_inputs(place, problem.info)
-        found, notes = Candidate(table.signals), table.notes(problem.experiment.stop_time)
-    else:
-        found = recorded_inputs(place, problem.name)
+    found, notes = read_known(place, problem)
     try:
         fitted = fit(problem.space, replace(found, origin=KNOWN, rationale=f"from {utf_8(str(place))}"))
     except CandidateError as error:
@@ -234,25 +226,30 @@ def known_inputs(place: Path, problem: Problem) -> Fitted:
     return replace(fitted, notes=(*notes, *fitted.notes))
 
 
-def recorded_inputs(place: Path, requirement: str) -> Candidate:
-    """Return a counterexample, or the candidate with the smallest robustness in a run.
+def read_known(place: Path, problem: Problem) -> tuple[Candidate, list[str]]:
+    """Read known inputs as they are, with notes on what of a file is not used, or kept after its end.
 
-    A run is judged by the requirement if it searched that, otherwise by its first one.
+    The place is a CSV file of inputs, a counterexample file, or a run directory, of which the candidate with
+    the smallest robustness is taken. A run is judged by the problem's requirement if it searched that,
+    otherwise by its first one.
 
     Raises:
-        SpecError: if it is neither, or every simulation of the run failed.
+        SpecError: if the place is none of these, or every simulation of the run failed.
     """
+    if place.suffix.lower() == ".csv" and not place.is_dir():
+        table = read_inputs(place, problem.info)
+        return Candidate(table.signals), table.notes(problem.experiment.stop_time)
     if not holds_run(place):
         if not place.is_dir() and place.suffix.lower() != ".json":
             found = "" if place.exists() else "no such file; "
             expected = "a CSV file of inputs (u.csv), a counterexample.json or a run directory"
             raise SpecError(f"{place}: {found}expected {expected}")
-        return Candidate.from_json(store.load_counterexample(place).candidate)
+        return Candidate.from_json(store.load_counterexample(place).candidate), []
     names = manifest.read(place).names
-    judged = _judged(place, requirement if requirement in names else names[0])
+    judged = _judged(place, problem.name if problem.name in names else names[0])
     if not judged:
         raise SpecError(f"{place}: no simulation of this run has a verdict; choose another run")
-    return min(judged, key=lambda pair: pair[0])[1]
+    return min(judged, key=lambda pair: pair[0])[1], []
 
 
 def _judged(directory: Path, requirement: str) -> list[tuple[float, Candidate]]:

@@ -157,19 +157,18 @@ def formalized_text(found: Formalized) -> str:
     for reason in dict.fromkeys(found.rejected):
         # In one line, without the formula with a caret below it that errors of its syntax have.
         said = "; ".join(line for line in reason.splitlines() if not line.startswith("  "))
-        lines.append(f"rejected: {one_line(said)}")
+        lines.append(f"rejected: {said}")
     lines.append(f"language model: {llm_use(found.spent)}")
-    return "\n".join(lines)
+    return "\n".join(map(one_line, lines))
 
 
 def _reading_lines(number: int, reading: Reading) -> Iterator[str]:
     yield f"{number}. {reading.formula}"
     yield f"   in words   {reading.words}"
     if reading.meaning:
-        yield f"   meant      {one_line(reading.meaning)}"
+        yield f"   meant      {reading.meaning}"
     if (nominal := reading.nominal) is not None:
-        least = nominal.robustness
-        failed = f"the simulation failed: {one_line(nominal.reason)}"
+        least, failed = nominal.robustness, f"the simulation failed: {nominal.reason}"
         told = failed if least is None else f"robustness {signed(least)} ({margin_words(least)})"
         yield f"   nominal    {told}"
 

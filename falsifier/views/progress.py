@@ -6,7 +6,6 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from falsifier.core.literals import one_line
 from falsifier.core.words import counted, readable
 from falsifier.engines import ENGINES
 from falsifier.fmu import watching
@@ -112,7 +111,7 @@ class _Line:
         """Show what an event has changed."""
         if isinstance(event, events.RunStarted):
             names = ", ".join(problem.name for problem in event.problems)
-            self._begin(one_line(f"{names}, {event.engines[0]}"), event.budget)
+            self._begin(f"{names}, {event.engines[0]}", event.budget)
         for line in self._news.lines(event):
             if self._keep is None:
                 self._note = line

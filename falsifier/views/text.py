@@ -36,8 +36,8 @@ def result_text(result: Result) -> str:
     lines = [head, *fact_lines(result_facts(result))]
     place = shell_word(result.directory)
     if result.directory is not None and result.directory.is_dir():
-        lines.append(f"  files          {result.directory}")
-        lines += [f"  picture        {picture}" for picture in _pictures(result)]
+        pictures = (("picture", str(picture)) for picture in _pictures(result))
+        lines += fact_lines([("files", str(result.directory)), *pictures])
         if result.status == "not falsified" and result.best is not None:
             nearest = f"falsifier explain {place} (the nearest miss), " if not result.best.violated else ""
             lines.append(f"to look closer: {nearest}falsifier coverage {place} (what was tried)")

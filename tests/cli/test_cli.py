@@ -22,6 +22,7 @@ from tests.command import ROOT, commands, falsifier
         (["run", "AT1", "--search", "throtle=0:100:7"], "did you mean 'throttle'"),
         (["run", "AT1", "--budget", "0"], "--budget 0: expected a whole number from 1 to"),
         (["check", "AT1", "--budget", "-1"], "--budget -1: expected a whole number from 0 to"),
+        (["explain", "run", "--map", "--budget", "99999999999"], "--budget 99999999999: expected a whole"),
         (["run", "AT1", "--seed", "1", "--seed=2"], "--seed: given 2 times; give one"),
         (["info", "python:tests.problems:easy"], "bundled name, not a problem made in Python"),
         (["init", ""], "an argument is empty"),

@@ -131,12 +131,6 @@ def test_the_robustness_map_says_how_far_the_violation_reaches(folder: Path) -> 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["explain", "run", "--map", "--budget", "-5"], "--budget -5: expected a whole number from 1 to"),
-        (["explain", "run", "--shrink", "--budget", "0"], "--budget 0: expected a whole number from 1 to"),
-        (
-            ["explain", "run", "--map", "--budget", "99999999999"],
-            "--budget 99999999999: expected a whole number",
-        ),
         (["explain", "run", "--map", "--budget", "6"], "budget: expected"),
         (["explain", "run", "--map", "--out", "x.xyz"], "x.xyz: expected a file name that ends in .svg"),
         (["explain", "run", "--map", "--out", "gone/x.png"], "gone/x.png: no such folder gone"),

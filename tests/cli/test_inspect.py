@@ -10,7 +10,7 @@ from falsifier.core.files import bundled
 from falsifier.fmu import read_info
 from falsifier.fmu.description.archive import this_platform
 from falsifier.fmu.process.registry import REGISTRY
-from tests.command import ROOT, falsifier
+from tests.command import falsifier
 from tests.fixtures import simulink
 from tests.fmu.fixtures import path as fixture
 
@@ -24,10 +24,9 @@ def test_info_shows_units_ranges_and_descriptions(tmp_path: Path) -> None:
 
 
 def test_info_says_what_is_ignored_and_what_cannot_be_simulated(tmp_path: Path) -> None:
-    fixtures = ROOT / "tests" / "fixtures" / "fmus"
-    clocked = falsifier("info", str(fixtures / "Clocked_3.fmu"), cwd=tmp_path)
+    clocked = falsifier("info", str(fixture("Clocked_3")), cwd=tmp_path)
     assert "note: input clocks are ignored, so they never tick: tick" in clocked.out
-    scheduled = falsifier("info", str(fixtures / "Scheduled_3.fmu"), cwd=tmp_path)
+    scheduled = falsifier("info", str(fixture("Scheduled_3")), cwd=tmp_path)
     assert "scheduled execution is not supported" in scheduled.out
 
 
@@ -79,7 +78,7 @@ def test_init_writes_where_a_link_leads(tmp_path: Path) -> None:
 
 
 def test_nothing_is_written_for_an_fmu_that_cannot_be_simulated(tmp_path: Path) -> None:
-    shutil.copy(ROOT / "tests" / "fixtures" / "fmus" / "Scheduled_3.fmu", tmp_path)
+    shutil.copy(fixture("Scheduled_3"), tmp_path)
     done = falsifier("init", "Scheduled_3.fmu", cwd=tmp_path, code=3)
     assert "scheduled execution is not supported" in done.err
     assert not (tmp_path / "Scheduled_3.toml").exists()

@@ -18,9 +18,7 @@ def test_a_damaged_line_is_told_with_its_cure_and_the_run_goes_on(command: Any, 
     path.write_bytes(b"".join(lines))
     with pytest.raises(JournalError, match=r"line 4 is damaged: its checksum .* falsifier tools repair"):
         read_journal(tmp_path)
-    done = command("tools", "repair", str(tmp_path))
-    assert done.exit_code == 0, done.output
-    assert "line 4 is damaged" in done.output
+    assert "line 4 is damaged" in command("tools", "repair", str(tmp_path), code=0).output
     assert (tmp_path / "journal.jsonl.damaged-1").read_bytes() == b"".join(lines)
     assert len(read_journal(tmp_path)) == 3
     assert Numeric().resume(tmp_path).falsified

@@ -93,7 +93,6 @@ def test_a_folder_of_runs_that_another_task_removes_is_made_again(
         ((*SPEED, "--set", "airLoad=0:1"), "to search a range: --search airLoad=LOW:HIGH"),
         ((*SPEED, "--search", "speed"), "--search speed: cannot be set: the model computes"),
         ((*SPEED, "--set", "throttle=3", "--search", "throttle"), "drop one of them"),
-        (("AT1", "--set", "throtle=3"), "did you mean 'throttle'?"),
         (("my.fmu", "--stl", "G (speed <= 1)", "--parameterization", "fixd"), "only specs have profiles"),
         (("AT1", "--parameterization", "free,fixed"), "for example instance2,fixed"),
         (("AT1", "--parameterization", "free:x"), "expected a time in s"),

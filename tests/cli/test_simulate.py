@@ -4,10 +4,13 @@ from pathlib import Path
 import pytest
 
 from falsifier.core.files import bundled
+from falsifier.record.run import falsify
+from falsifier.testing import lag_problem
 from tests.command import falsifier
 from tests.fmu.fixtures import altered, path as fixture
 from tests.fmu.packages import PLANT, structure, system, write
 from tests.pictures import CRITICAL, INPUT, OUTPUT, colours
+from tests.problems import easy
 
 EASY = "python:tests.problems:easy"
 
@@ -134,6 +137,13 @@ def test_wrong_use_ends_with_two_and_a_failed_simulation_with_three(
 ) -> None:
     done = falsifier("simulate", *arguments, cwd=tmp_path)
     assert done.code == (3 if "unusable" in arguments[0] else 2) and said in done.err
+
+
+def test_of_a_run_of_several_requirements_the_best_sample_for_this_one_is_simulated(tmp_path: Path) -> None:
+    other = lag_problem("G[0,10] (x >= -2)", name="OTHER")
+    _, result = falsify([other, easy()], "corners", budget=5, directory=tmp_path / "r")
+    done = falsifier("simulate", EASY, "--inputs", "r", "--json", cwd=tmp_path, code=1)
+    assert done.json["robustness"] == result.robustness
 
 
 def test_a_run_starts_from_known_inputs_and_resumes_with_them(tmp_path: Path) -> None:

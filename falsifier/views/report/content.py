@@ -7,7 +7,7 @@ from os.path import realpath
 from pathlib import Path
 from typing import Literal
 
-from falsifier.campaigns.analysis import Run, Table, load, main_table, not_begun, read_published
+from falsifier.campaigns.analysis import Run, Table, group, load, main_table, not_begun, read_published
 from falsifier.campaigns.directory import is_campaign
 from falsifier.campaigns.progress import spent_together
 from falsifier.core.candidate import Candidate
@@ -77,15 +77,10 @@ class Section:
     heading: str  # the name; of a formula without a name, the formula
     formula: str
     sentence: str  # what it means
-    by_method: dict[str, list[Run]]  # its runs by method
+    runs: list[Run]  # its runs, those of a method after each other
     # Counterexamples, the shrunk and quickest ones first; if there are none, the best simulation of all runs.
     shown: list[Shown]
     found: list[Run]  # the runs that found what is shown, or would be if it were not too much
-
-    @property
-    def runs(self) -> list[Run]:
-        """Its runs with all methods."""
-        return [run for runs in self.by_method.values() for run in runs]
 
     @property
     def status(self) -> Status:
@@ -128,16 +123,16 @@ def by_requirement(sides: Iterable[Side]) -> dict[str, list[Section | None]]:
 
 def _side(directory: Path, title: str) -> Side:
     runs = load(directory)
-    grouped: dict[str, dict[str, list[Run]]] = {}
-    for run in runs:
-        grouped.setdefault(run.requirement, {}).setdefault(run.method.label, []).append(run)
+    grouped, searched = group(runs), dict[str, list[Run]]()
+    for (requirement, _), members in grouped.items():
+        searched.setdefault(requirement, []).extend(members)
     # Of a single run, shares and means say nothing.
-    counts = is_campaign(directory) or any(len(m) > 1 for by in grouped.values() for m in by.values())
+    counts = is_campaign(directory) or any(len(members) > 1 for members in grouped.values())
     return Side(
         title,
         runs,
         main_table([*runs, *not_begun(directory, runs)], read_published()) if counts else None,
-        [_section(name, by_method) for name, by_method in grouped.items()],
+        [_section(name, own) for name, own in searched.items()],
     )
 
 
@@ -146,20 +141,18 @@ def spent_on(runs: Iterable[Run]) -> Spent:
     return spent_together((run.directory, run.spent) for run in runs)
 
 
-def _section(name: str, by_method: dict[str, list[Run]]) -> Section:
-    runs = [run for members in by_method.values() for run in members]
+def _section(name: str, runs: list[Run]) -> Section:
     found = [run for run in runs if run.falsified]
     if not found:
         judged = {run.verdict.robustness: run for run in reversed(runs) if run.verdict is not None}
         found = [judged[min(judged)]] if judged else []
     both = sorted(((run, _shrunk(run)) for run in found), key=lambda b: (b[1] is None, b[0].simulations))
     shown = [shrunk or shown_of(run, _recorded(run)) for run, shrunk in both[:_MOST_SHOWN]]
-    return section_of(name, by_method, shown, [run for run, _ in both])
+    return section_of(name, runs, shown, [run for run, _ in both])
 
 
-def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown], found: list[Run]) -> Section:
+def section_of(name: str, runs: list[Run], shown: list[Shown], found: list[Run]) -> Section:
     """Return what is said of a requirement; shown: counterexamples or, without any, the best simulation."""
-    runs = [run for members in by_method.values() for run in members]
     requirement = runs[0].manifest.requirement
     heading = requirement.formula if runs[0].is_ad_hoc else name
     if heading != name and name != requirement.name:
@@ -169,7 +162,7 @@ def section_of(name: str, by_method: dict[str, list[Run]], shown: list[Shown], f
         heading,
         requirement.formula,
         requirement.description or in_words(parse(requirement.formula)),
-        by_method,
+        runs,
         shown,
         found,
     )

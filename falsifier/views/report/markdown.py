@@ -35,10 +35,10 @@ def markdown_report(*directories: Path) -> str:
 
 def _verdict(section: Section, where: str) -> list[str]:
     """What a card of the page shows, without its picture."""
-    result = markdown_text(one_line(wording.result_text(section)))
+    result = markdown_text(wording.result_text(section))
     parts = [
         f"## {markdown_text(section.heading)}{where}: {section.status}",
-        markdown_text(one_line(section.sentence)),
+        markdown_text(section.sentence),
         f"**{result[:1].upper()}{result[1:]}.**",
     ]
     if section.shown:
@@ -63,9 +63,9 @@ def _found(shown: Shown) -> list[str]:
     if shown.candidate.parameters:
         parts.append(_facts(wording.parameter_facts(shown)))
     if shown.explanation:
-        parts.append(markdown_text(one_line(shown.explanation)))
+        parts.append(markdown_text(shown.explanation))
     if shown.confirmed:
-        parts.append(f"Confirmed: {markdown_text(one_line(shown.confirmed))}.")
+        parts.append(f"Confirmed: {markdown_text(shown.confirmed)}.")
     if beside := wording.margin_beside(shown):
         parts.append(_facts(beside))
     advice = wording.advice(shown)
@@ -77,13 +77,11 @@ def _found(shown: Shown) -> list[str]:
 
 
 def _facts(facts: Iterable[Fact]) -> str:
-    return "\n".join(
-        f"- {markdown_text(one_line(f'{name}: {text}' if name else text))}" for name, text in facts
-    )
+    return "\n".join(f"- {markdown_text(f'{name}: {text}' if name else text)}" for name, text in facts)
 
 
 def _listed(title: str, lines: Iterable[str]) -> list[str]:
-    items = [f"- {markdown_text(one_line(line))}" for line in lines]
+    items = [f"- {markdown_text(line)}" for line in lines]
     return ["\n".join([f"{title}:", "", *items])] if items else []
 
 

@@ -6,7 +6,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from falsifier.campaigns.analysis import Run, Table
+from falsifier.campaigns.analysis import Run, Table, group
 from falsifier.core.files import file_name
 from falsifier.core.literals import shell_word
 from falsifier.core.words import counted
@@ -184,8 +184,8 @@ def _details(section: Section, most: int) -> Html:
     runs, first = section.runs, section.shown[:1]
     held = held_text(runs[0].manifest.not_searched)
     histories = [
-        drawn(partial(plot_history, members), f"Robustness over simulations, {label}")
-        for label, members in section.by_method.items()
+        drawn(partial(plot_history, members), f"Robustness over simulations, {method.label}")
+        for (_, method), members in group(runs).items()
     ]
     if len(runs) > 1:
         histories.append(drawn(lambda: plot_rates(runs), "Share of falsified runs over simulations"))

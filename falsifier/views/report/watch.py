@@ -179,7 +179,7 @@ def _run_html(run: Run, watched: _Watched) -> Html:
     if watched.exchange:
         title = "The last question to the language model, and its answer"
         more += [el("h3", title), exchange_html(watched.exchange)]
-    return card_html(section_of(run.requirement, {run.method.label: [run]}, shown, [run]), more=more)
+    return card_html(section_of(run.requirement, [run], shown, [run]), more=more)
 
 
 def application(watch: Watch) -> "Application":
