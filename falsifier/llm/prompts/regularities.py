@@ -1,11 +1,12 @@
 """What signals were each time that a discrete signal changed, which tells of thresholds and conditions."""
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.llm.prompts.courses import Array
@@ -14,25 +15,32 @@ from falsifier.llm.prompts.view import View
 
 # Changes that are told, and the conditions of one.
 _MOST_TOLD, _MOST_CONDITIONS = 6, 4
-# A condition is a range that is so narrow, as a share of all values, in which a signal is for no more than
-# this share of the time, and in which it would be each time by chance with no more than this probability.
-_NARROW, _SELDOM, _CHANCE = 0.1, 0.6, 0.03
+# A condition is a range, or two, as narrow as this share of all values, in which a signal is for no more than
+# this share of the time, and in which some signal would be each time by chance with no more than this
+# probability.
+_NARROW, _SELDOM, _CHANCE = 0.1, 0.6, 0.1
 # A signal with so many different changes counts: all that lead up are told together, and all that lead down.
 _COUNTS = 7
+# What is not discrete jumps where it changes in one step by this share of its span, and so many times as much
+# as in the steps beside that.
+_JUMP, _ALONE = 0.03, 4.0
 # Changes of one signal in a sample, and times of a sample, that are looked at.
 _MOST_OF_SAMPLE, _TIMES = 50, 100
 
-_HEAD = "So far, other signals just before each change of a discrete signal, and inputs at the change, were:"
+_HEAD = (
+    "So far, other signals just before each change of a discrete signal, or jump of another one, and inputs "
+    "at that time, were:"
+)
 
 
 @dataclass
 class Regularities:
-    """Collects what was so when discrete signals changed."""
+    """Collects what was so when discrete signals changed, and others jumped."""
 
     view: View
     _known: list[Array] = field(default_factory=list)  # values of a sample, shape (signals, times)
-    # By signal and by its values before and after, those of all signals each time, shape (signals,).
-    _seen: defaultdict[str, defaultdict[tuple[float, float], list[Array]]] = field(
+    # By signal and its change, in words and whether it leads up, the values of all signals, shape (signals,).
+    _seen: defaultdict[str, defaultdict[tuple[str, bool], list[Array]]] = field(
         default_factory=lambda: defaultdict(lambda: defaultdict(list))
     )
 
@@ -45,14 +53,21 @@ class Regularities:
         before = np.roll(then, 1, axis=1)
         before[len(self.view.recorded) :] = then[len(self.view.recorded) :]
         self._known.append(then[:, :: max(1, len(inside) // _TIMES)])
-        for name, column in self.view.discrete(inside).items():
-            for k in (np.flatnonzero(np.diff(column)) + 1)[:_MOST_OF_SAMPLE].tolist():
-                self._seen[name][float(column[k - 1]), float(column[k])].append(before[:, k])
+        discrete = self.view.discrete(inside)
+        for name in self.view.recorded:
+            column = inside[name]
+            changes = np.flatnonzero(np.diff(column)) + 1 if name in discrete else _jumps(column)
+            for k in changes[:_MOST_OF_SAMPLE].tolist():
+                is_up = bool(column[k] > column[k - 1])
+                ends = (self._value(name, v, 6) for v in column[k - 1 : k + 1].tolist())
+                change = " -> ".join(ends) if name in discrete else f"jumps {'up' if is_up else 'down'}"
+                self._seen[name][change, is_up].append(before[:, k])
 
     @property
     def text(self) -> str:
         """What was so each time, in a line for each change, those of the requirement's signals first."""
         lines = [line for name in self.view.recorded if name in self._seen for line in self._of(name)]
+        lines.sort(key=lambda line: " jumps " in line)
         return "\n".join((_HEAD, *lines[:_MOST_TOLD])) if lines else ""
 
     @cached_property
@@ -62,31 +77,48 @@ class Regularities:
         return (*recorded, *(r.name for r in self.view.space.inputs if r.name not in recorded))
 
     def _of(self, name: str) -> Iterator[str]:
+        counts = len(self._seen[name]) >= _COUNTS
         changes: defaultdict[str, list[Array]] = defaultdict(list)
-        for (a, b), seen in self._seen[name].items():
-            way = "up" if b > a else "down"
-            one = f"{self._value(name, a, 6)} -> {self._value(name, b, 6)}"
-            changes[way if len(self._seen[name]) >= _COUNTS else one] += seen
+        for (change, is_up), seen in self._seen[name].items():
+            changes[("up" if is_up else "down") if counts else change] += seen
         for change, seen in changes.items():
-            if so := self._common(name, np.array(seen)):
+            own = () if change.startswith("jumps") else (name,)
+            if so := self._common(np.array(seen).T, without=own):
                 yield f"- {name} {change}, {len(seen)} times: {', '.join(so[:_MOST_CONDITIONS])}"
 
-    def _common(self, changed: str, seen: Array) -> list[str]:
+    def _common(self, seen: Array, *, without: Collection[str]) -> list[str]:
         """Signals that were in a narrow range each time, and seldom are, the most telling ones first.
 
-        ``seen`` has their values, shape (times, signals).
+        ``seen`` has their values, shape (signals, times).
         """
-        known = np.concatenate(self._known, axis=1)
-        low, high = seen.min(axis=0), seen.max(axis=0)
-        share = ((known >= low[:, None]) & (known <= high[:, None])).mean(axis=1)
-        is_narrow = (high - low <= _NARROW * np.ptp(known, axis=1)) & (share <= _SELDOM)
-        # The first time says where the range is.
-        is_condition = is_narrow & (share ** (len(seen) - 1) <= _CHANCE)
-        words = []
-        for k in [k for k in np.argsort(share).tolist() if is_condition[k] and self._names[k] != changed]:
-            ends = (self._value(self._names[k], end, column_decimals(known[k])) for end in (low[k], high[k]))
-            words.append(f"{self._names[k]} {' to '.join(dict.fromkeys(ends))}")
-        return words
+        found = []
+        for name, values, known in zip(self._names, seen, np.concatenate(self._known, axis=1), strict=True):
+            ranges = [] if name in without else _ranges(values, float(np.ptp(known)))
+            share = float(sum(((known >= low) & (known <= high)).mean() for low, high in ranges))
+            # The first time in each range says where it is.
+            by_chance = len(self._names) * share ** (len(values) - len(ranges))
+            if ranges and share <= _SELDOM and by_chance <= _CHANCE:
+                decimals = column_decimals(known)
+                ends = (dict.fromkeys(self._value(name, end, decimals) for end in one) for one in ranges)
+                found.append((share, f"{name} {' or '.join(map(' to '.join, ends))}"))
+        return [text for _, text in sorted(found)]
 
     def _value(self, name: str, value: float, decimals: int) -> str:
         return self.view.labelled(name, value, plain(value, decimals))
+
+
+def _ranges(values: Array, span: float) -> list[tuple[float, float]]:
+    """The narrow range in which values are, as those of a threshold; or two, as those of two; else none."""
+    ordered = np.sort(values)
+    parts = [ordered]
+    if np.ptp(ordered) > _NARROW * span:
+        parts = np.split(ordered, [int(np.diff(ordered).argmax()) + 1])
+    is_narrow = sum(map(np.ptp, parts)) <= _NARROW * span and min(map(len, parts)) >= len(parts)
+    return [(float(part[0]), float(part[-1])) for part in parts] if is_narrow else []
+
+
+def _jumps(column: Array) -> NDArray[np.intp]:
+    """Indices at which a signal changes at once, more than it moves before and after."""
+    size = np.abs(np.diff(column))
+    beside = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
+    return np.flatnonzero((size >= _JUMP * np.ptp(column)) & (size > _ALONE * beside)) + 1

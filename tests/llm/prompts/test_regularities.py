@@ -1,5 +1,6 @@
 """What signals were each time that a discrete one changed, against columns made for it."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -32,14 +33,24 @@ def lines(count: int, counter: Array, mode: Array) -> list[str]:
 
 def test_thresholds_and_conditions_are_told_of_changes_that_were_seen_several_times() -> None:
     parity, follower = np.floor(TIMES / 11.5) % 2, (SWITCHED > 0).astype(np.float64)
-    assert lines(1, 0 * TIMES, 0 * TIMES) == []
-    head, up, down, on, off = lines(3, parity, follower)
-    assert "just before each change" in head
+    assert lines(1, TIMES // 50, 0 * TIMES)[1:] == ["- x jumps down, 8 times: x 1.991"]
+    head, up, down, on, off, jump = lines(3, parity, follower)
+    assert "just before each change" in head and jump == "- x jumps down, 24 times: x 1.991"
     assert [up, down] == ["- n 0 -> 1, 12 times: x 1.991", "- n 1 -> 0, 12 times: x 1.991"]
     assert on.startswith("- mode 0 -> 1, ") and off.startswith("- mode 1 -> 0, ")
     assert "u 1" in on and "u -1" in off, "an input has its new value"
 
 
+def test_two_thresholds_are_told_as_two() -> None:
+    outside = (np.abs(SAW - 1.5) > 0.3).astype(np.float64)
+    off, on = lines(2, 0 * TIMES, outside)[1:3]
+    assert re.fullmatch(r"- mode 1 -> 0, \d+ times: x 1\.19\d*( to 1\.2)?", off)
+    assert re.fullmatch(r"- mode 0 -> 1, \d+ times: x 1\.79\d*( to 1\.8)?", on)
+    turned = (np.abs(SAW - 1.5) > 0.3) ^ (np.abs(SAW - 1.5) > 0.1)
+    (on, off) = lines(2, 0 * TIMES, turned.astype(np.float64))[1:3]
+    assert " or " in on and " or " in off
+
+
 def test_all_steps_of_a_counter_are_one_change() -> None:
-    _, only = lines(2, np.floor(TIMES / 11.5), 0 * TIMES)
+    _, only, _ = lines(2, np.floor(TIMES / 11.5), 0 * TIMES)
     assert only == "- n up, 16 times: x 1.991"
