@@ -20,6 +20,8 @@ Points = tuple[tuple[float, float, float], ...]
 
 # Changes listed individually; of longer lists the beginning and the end.
 SHOWN_CHANGES = 24
+# Stays are equal up to this share of them.
+_EQUAL_STAYS = 1e-6
 # So many changes by the same amount, after the same time, are told together.
 _REGULAR = 4
 # Breakpoints of one signal; a signal that needs more is told less exactly, and how exactly.
@@ -87,7 +89,7 @@ def _changes(begun: Sequence[tuple[float, float]], clock: int, label: Label) -> 
 
 
 def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda _, text: text) -> str:
-    """The shortest stay at each value at which the signal stayed more than once; or empty.
+    """The shortest stay at each value at which the signal stayed more than once, or that all were equal.
 
     The last stay is cut off by the end of the times.
     """
@@ -98,8 +100,11 @@ def dwell_list(times: Array, column: Array, *, clock: int, label: Label = lambda
         count = len(stays) + (found[-1][0] == value)
         if count > 1:
             length, start = min(stays)
-            shortest = f"the shortest for {number(length, 6)} s from {plain(start, clock)} s"
-            words.append(f"{count} times at {label(value, plain(value, 6))}, {shortest}")
+            told = f"the shortest for {number(length, 6)} s from {plain(start, clock)} s"
+            if len(stays) > 1 and max(stays)[0] - length < _EQUAL_STAYS * length:
+                told = f"each for {number(length, 6)} s"
+                told += ", the last one to the end" * (len(stays) < count)
+            words.append(f"{count} times at {label(value, plain(value, 6))}, {told}")
     return "; ".join(words)
 
 

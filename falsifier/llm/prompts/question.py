@@ -24,7 +24,7 @@ from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.regularities import Regularities
 from falsifier.llm.prompts.standing import formula_text, standing
-from falsifier.llm.prompts.together import Side, apart, recurring
+from falsifier.llm.prompts.together import Side, apart, came_nearer, recurring
 from falsifier.llm.prompts.tried import Tried
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.llm.usage import count_tokens
@@ -154,7 +154,7 @@ class Questions:
                 "choose a plainer prompt variant"
             )
         lasting, latest = self._lasting(), self._latest()
-        if size + self._count(latest) > self._aim:
+        if size + self._count(latest) > MOST_PROMPT_TOKENS:
             latest = ""
         changing = "\n\n".join(part for part in (lasting, latest, news) if part)
         return (
@@ -244,7 +244,7 @@ class Questions:
             yield "\n".join((*few, *self._climb.lines))
         if self._climb.is_told or self._is_flat() or self._is_stuck():
             untried = _UNTRIED.format(gaps) if (gaps := self._tried.gaps) else ""
-            yield from (text for text in (self._reached.unmoved, untried) if text)
+            yield from (text for text in (self._reached.extent, untried) if text)
 
     def _advice(self) -> Iterator[str]:
         """How to use the samples with a verdict, of which there are some."""
@@ -256,8 +256,11 @@ class Questions:
             yield on_strategy(self._view.space, is_flat=is_flat, is_stuck=self._is_stuck())
 
     def _is_stuck(self) -> bool:
-        """Whether the last two samples were no better than those before."""
-        return len(self._judged) > 2 and self._best_first()[0] not in self._judged[-2:]
+        """Whether the last two samples were no better than those before, also in nothing that is needed."""
+        before, last = self._judged[:-2], self._judged[-2:]
+        if not before or self._best_first()[0] in last:
+            return False
+        return not came_nearer([s.closest for s in last], [s.closest for s in before])
 
     def _is_flat(self) -> bool:
         """Whether several samples had the same robustness, and none had another."""

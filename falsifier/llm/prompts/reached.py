@@ -132,14 +132,20 @@ class Reached:
         return f"{words} ({', '.join(map(beside, names))})" if names else words
 
     @property
-    def unmoved(self) -> str:
-        """Which signals were the same in all samples; empty if none was."""
+    def extent(self) -> str:
+        """Which signals were the same in all samples, and how far the others went."""
         moved = {name for name, before, _ in self._stages if before is not None}
         moved |= {name for name, (low, high) in self._ranges.items() if low < high}
         values = Counter(name for name, before, _ in self._stages if before is None)
         known = [n for n in self._view.recorded if n in values or n in self._ranges]
         same = [name for name in known if name not in moved and values[name] < 2]
-        return f"The same in all samples: {', '.join(same)}." if same else ""
+        ranges = []
+        for name, (low, high) in list(self._ranges.items())[:_MOST_BESIDE]:
+            if low < high and not values[name]:
+                ends = (number(end, resolving(end, high - low, 3)) for end in (low, high))
+                ranges.append(f"{name} {' to '.join(ends)}")
+        found = [f"The same in all samples: {', '.join(same)}."] if same else []
+        return "\n".join((*found, *([f"Ranges so far: {', '.join(ranges)}."] if ranges else [])))
 
     @staticmethod
     def _few(stages: Sequence[Stage], *, but_all_of: Collection[str] = ()) -> list[Stage]:

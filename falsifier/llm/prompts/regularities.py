@@ -39,7 +39,7 @@ class Regularities:
 
     view: View
     _known: list[Array] = field(default_factory=list)  # values of a sample, shape (signals, times)
-    # By signal and its change, in words and whether it leads up, the values of all signals, shape (signals,).
+    # By signal and its change, in words and whether it leads up, the values of all signals, then the time.
     _seen: defaultdict[str, defaultdict[tuple[str, bool], list[Array]]] = field(
         default_factory=lambda: defaultdict(lambda: defaultdict(list))
     )
@@ -61,7 +61,7 @@ class Regularities:
                 is_up = bool(column[k] > column[k - 1])
                 ends = (self._value(name, v, 6) for v in column[k - 1 : k + 1].tolist())
                 change = " -> ".join(ends) if name in discrete else f"jumps {'up' if is_up else 'down'}"
-                self._seen[name][change, is_up].append(before[:, k])
+                self._seen[name][change, is_up].append(np.append(before[:, k], inside.times[k]))
 
     @property
     def text(self) -> str:
@@ -79,11 +79,13 @@ class Regularities:
     def _of(self, name: str) -> Iterator[str]:
         counts = len(self._seen[name]) >= _COUNTS
         changes: defaultdict[str, list[Array]] = defaultdict(list)
-        for (change, is_up), seen in self._seen[name].items():
-            changes[("up" if is_up else "down") if counts else change] += seen
-        for change, seen in changes.items():
+        for (change, is_up), found in self._seen[name].items():
+            changes[("up" if is_up else "down") if counts else change] += found
+        for change, found in changes.items():
+            # Samples with the same beginning have the same changes there, which are one.
+            seen: Array = np.unique(np.array(found), axis=0)[:, :-1]
             own = () if change.startswith("jumps") else (name,)
-            if so := self._common(np.array(seen).T, without=own):
+            if so := self._common(seen.T, without=own):
                 yield f"- {name} {change}, {len(seen)} times: {', '.join(so[:_MOST_CONDITIONS])}"
 
     def _common(self, seen: Array, *, without: Collection[str]) -> list[str]:

@@ -1,6 +1,6 @@
 """What must fail together, or for long, so that a requirement is violated; how close a sample came."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
@@ -102,6 +102,13 @@ def apart(samples: Mapping[int, Mapping[Side, float]]) -> str:
             f"{side} in {where}" if least == 0 else f"{side} in none, off by {shown(least):.4g} in {where}"
         )
     return f"Of what a violation needs at one time: {'; '.join(words)}." if words and not found else ""
+
+
+def came_nearer(last: Sequence[Mapping[Side, float]], before: Sequence[Mapping[Side, float]]) -> bool:
+    """Whether samples came nearer to something that must happen than those before, by ``closest`` of each."""
+    sides = set(last[0]).intersection(*last, *before)
+    nearest = ((min(max(s[side], 0.0) for s in part) for part in (last, before)) for side in sides)
+    return any(now < then for now, then in nearest)
 
 
 def near_misses(side: Side, times: Array, over_time: Mapping[Formula, Array]) -> Iterator[NearMiss]:

@@ -48,7 +48,7 @@ def test_dwell_list_names_the_shortest_stay() -> None:
     told = "2 times at 1, the shortest for 1.6 s from 0 s; 2 times at 2, the shortest for 0.25 s from 5 s"
     assert dwell_list(TIMES, GEAR, clock=2) == told
     back_at_the_end = dwell_list(TIMES, steps((0, 1), (2, 2), (3, 1), (4, 2), (5, 1)), clock=2)
-    told = "3 times at 1, the shortest for 1 s from 3 s; 2 times at 2, the shortest for 1 s from 2 s"
+    told = "3 times at 1, the shortest for 1 s from 3 s; 2 times at 2, each for 1 s"
     assert back_at_the_end == told
     assert dwell_list(TIMES, steps((0, 1), (2, 2), (3, 3)), clock=2) == "", "the changes tell as much"
     short = dwell_list(TIMES * 1e-6, steps((0, 1), (2, 2), (3, 1)), clock=8)

@@ -90,6 +90,17 @@ def test_what_does_not_fit_is_left_out_and_counted(monkeypatch: pytest.MonkeyPat
         Questions(View.of(PROBLEM), VARIANTS["MP5"]).ask()
 
 
+def test_the_latest_sample_is_told_in_full_beyond_the_usual_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("falsifier.llm.prompts.question.USUAL_PROMPT_TOKENS", 1200)
+    rng = np.random.default_rng(3)
+    last = asked_each(PROBLEM, sampled(PROBLEM, *rng.uniform(-1, 1, (40, 5))))[-1].content
+    assert (
+        " of 40, in the order in which" in last
+        and "More of sample 40:\n" in last
+        and "\n  x around t = " in last
+    )
+
+
 def test_the_best_of_all_samples_are_named_and_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("falsifier.llm.prompts.question.MOST_PROMPT_TOKENS", 2600)
     evaluations = sampled(PROBLEM, *np.random.default_rng(3).uniform(-1, 1, (40, 5)))
@@ -147,6 +158,7 @@ def test_on_a_plateau_it_is_told_what_nothing_moved_and_what_was_not_tried() -> 
         "Not tried so far: throttle between 0 and 100; brake between 0 and 300. See" in changing
         and "The same in all" not in changing
     )
+    assert re.search(r"^Ranges so far: speed 0 to \S+, rpm \S+ to \S+\.$", changing, re.MULTILINE)
     _, same = told(problem, "MP5", sampled(problem, still, [0.0] * 7 + [300.0] * 3))
     assert "The same in all samples: gear." in same
     _, other = told(PROBLEM, "MP5", sampled(PROBLEM, [0.0] * 5, [0.5] * 5))

@@ -26,8 +26,8 @@ def lines(count: int, counter: Array, mode: Array) -> list[str]:
     seen = Regularities(
         replace(view, info=ModelInfo("m", variables=kinds), space=space, experiment=experiment)
     )
-    for _ in range(count):
-        seen.add(Trajectory(TIMES, {"x": SAW, "n": counter, "mode": mode, "u": SWITCHED}))
+    for k in range(count):  # those with the same beginning would be one
+        seen.add(Trajectory(TIMES, {"x": SAW + 1e-9 * k, "n": counter, "mode": mode, "u": SWITCHED}))
     return seen.text.splitlines()
 
 
@@ -54,3 +54,16 @@ def test_two_thresholds_are_told_as_two() -> None:
 def test_all_steps_of_a_counter_are_one_change() -> None:
     _, only, _ = lines(2, np.floor(TIMES / 11.5), 0 * TIMES)
     assert only == "- n up, 16 times: x 1.991"
+
+
+def test_what_was_so_in_samples_with_the_same_beginning_was_so_once() -> None:
+    view = replace(
+        View.of(lag_problem("G (x <= 0.9)")), info=ModelInfo("m", variables=(Variable("x", kind="integer"),))
+    )
+    seen = Regularities(view)
+    times = np.linspace(0.0, 10.0, 101)
+    for _ in range(3):
+        seen.add(Trajectory(times, {"x": np.where(times > 5, 1.0, 0.0), "u": times}))
+    assert seen.text == ""
+    seen.add(Trajectory(times, {"x": np.where(times > 7, 1.0, 0.0), "u": times - 2}))
+    assert seen.text.endswith("- x 0 -> 1, 2 times: u 5.1")

@@ -9,6 +9,7 @@ from falsifier.evaluation.evaluate import compiled
 from falsifier.llm.prompts.together import (
     Side,
     apart,
+    came_nearer,
     closest,
     longest_failure,
     near_misses,
@@ -91,3 +92,12 @@ def test_in_which_samples_each_of_what_a_violation_needs_happened(formula: str, 
     found = [closest(parsed, monitor.courses(t)) for t in (TRAJECTORY, other, TRAJECTORY)]
     text = apart({n: sides for n, sides in enumerate(found, start=1) if sides})
     assert text == (f"Of what a violation needs at one time: {told}." if told else "")
+
+
+def test_samples_come_nearer_in_one_of_what_must_happen_together() -> None:
+    left, right = (Side(parse(text), must_hold=True) for text in ("x >= 1", "y >= 1"))
+    first, better, met = {left: 3.0, right: 1.0}, {left: 4.0, right: 0.5}, {left: 3.0, right: -2.0}
+    assert came_nearer([better], [first]) and came_nearer([first], [better])
+    assert not came_nearer([first], [first, better])
+    assert not came_nearer([met | {right: -3.0}], [met]), "there is no nearer than met"
+    assert not came_nearer([{}], [{}])
