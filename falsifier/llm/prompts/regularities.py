@@ -1,9 +1,10 @@
 """What signals were each time that a discrete signal changed, which tells of thresholds and conditions."""
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
@@ -19,10 +20,15 @@ _MOST_TOLD, _MOST_CONDITIONS = 6, 4
 _NARROW, _SELDOM, _CHANCE = 0.1, 0.6, 0.03
 # A signal with so many different changes counts: all that lead up are told together, and all that lead down.
 _COUNTS = 7
-# Changes of one signal in a sample, and times of a sample, that are looked at.
-_MOST_OF_SAMPLE, _TIMES = 50, 100
+_UP, _DOWN = (-inf, inf), (inf, -inf)  # its further changes
+# Times of a sample that are looked at for the values that signals have.
+_TIMES = 100
 
 _HEAD = "So far, other signals just before each change of a discrete signal, and inputs at the change, were:"
+
+
+# How often a signal changed, and the least and the greatest value of each signal then, shape (signals,).
+Seen = tuple[int, Array, Array]
 
 
 @dataclass
@@ -31,8 +37,8 @@ class Regularities:
 
     view: View
     _known: list[Array] = field(default_factory=list)  # values of a sample, shape (signals, times)
-    # By signal and by its values before and after, those of all signals each time, shape (signals,).
-    _seen: defaultdict[str, defaultdict[tuple[float, float], list[Array]]] = field(
+    # By signal and by its values before and after, what was seen in each sample.
+    _seen: defaultdict[str, defaultdict[tuple[float, float], list[Seen]]] = field(
         default_factory=lambda: defaultdict(lambda: defaultdict(list))
     )
 
@@ -46,8 +52,15 @@ class Regularities:
         before[len(self.view.recorded) :] = then[len(self.view.recorded) :]
         self._known.append(then[:, :: max(1, len(inside) // _TIMES)])
         for name, column in self.view.discrete(inside).items():
-            for k in (np.flatnonzero(np.diff(column)) + 1)[:_MOST_OF_SAMPLE].tolist():
-                self._seen[name][float(column[k - 1]), float(column[k])].append(before[:, k])
+            seen, at = self._seen[name], defaultdict[tuple[float, float], list[int]](list)
+            for k in (np.flatnonzero(np.diff(column)) + 1).tolist():
+                change = float(column[k - 1]), float(column[k])
+                if change not in seen and len(seen.keys() | at.keys()) >= _COUNTS:
+                    change = _UP if change[1] > change[0] else _DOWN
+                at[change].append(k)
+            for change, found in at.items():
+                values = before[:, found]
+                seen[change].append((len(found), values.min(axis=1), values.max(axis=1)))
 
     @property
     def text(self) -> str:
@@ -62,26 +75,25 @@ class Regularities:
         return (*recorded, *(r.name for r in self.view.space.inputs if r.name not in recorded))
 
     def _of(self, name: str) -> Iterator[str]:
-        changes: defaultdict[str, list[Array]] = defaultdict(list)
+        changes: defaultdict[str, list[Seen]] = defaultdict(list)
         for (a, b), seen in self._seen[name].items():
             way = "up" if b > a else "down"
             one = f"{self._value(name, a, 6)} -> {self._value(name, b, 6)}"
             changes[way if len(self._seen[name]) >= _COUNTS else one] += seen
         for change, seen in changes.items():
-            if so := self._common(name, np.array(seen)):
-                yield f"- {name} {change}, {len(seen)} times: {', '.join(so[:_MOST_CONDITIONS])}"
+            if so := self._common(name, seen):
+                count = sum(times for times, _, _ in seen)
+                yield f"- {name} {change}, {count} times: {', '.join(so[:_MOST_CONDITIONS])}"
 
-    def _common(self, changed: str, seen: Array) -> list[str]:
-        """Signals that were in a narrow range each time, and seldom are, the most telling ones first.
-
-        ``seen`` has their values, shape (times, signals).
-        """
+    def _common(self, changed: str, seen: Sequence[Seen]) -> list[str]:
+        """Signals that were in a narrow range each time, and seldom are, the most telling ones first."""
         known = np.concatenate(self._known, axis=1)
-        low, high = seen.min(axis=0), seen.max(axis=0)
+        counts, lows, highs = zip(*seen, strict=True)
+        low, high = np.min(lows, axis=0), np.max(highs, axis=0)
         share = ((known >= low[:, None]) & (known <= high[:, None])).mean(axis=1)
         is_narrow = (high - low <= _NARROW * np.ptp(known, axis=1)) & (share <= _SELDOM)
         # The first time says where the range is.
-        is_condition = is_narrow & (share ** (len(seen) - 1) <= _CHANCE)
+        is_condition = is_narrow & (share ** (sum(counts) - 1) <= _CHANCE)
         words = []
         for k in [k for k in np.argsort(share).tolist() if is_condition[k] and self._names[k] != changed]:
             ends = (self._value(self._names[k], end, column_decimals(known[k])) for end in (low[k], high[k]))

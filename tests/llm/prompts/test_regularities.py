@@ -16,7 +16,7 @@ TIMES = np.linspace(0.0, 100.0, 1001)
 SAW, SWITCHED = 1.0 + np.mod(TIMES, 11.5) / 11.5, np.sign(np.sin(TIMES / 3.0))
 
 
-def lines(count: int, counter: Array, mode: Array) -> list[str]:
+def lines(count: int, counter: Array, mode: Array, saw: Array = SAW) -> list[str]:
     """What is told of so many samples with these discrete signals beside the ones above."""
     view = View.of(lag_problem("G (x <= 0.9)"))
     kinds = (Variable("x"), Variable("n", kind="integer"), Variable("mode", kind="boolean"))
@@ -26,7 +26,7 @@ def lines(count: int, counter: Array, mode: Array) -> list[str]:
         replace(view, info=ModelInfo("m", variables=kinds), space=space, experiment=experiment)
     )
     for _ in range(count):
-        seen.add(Trajectory(TIMES, {"x": SAW, "n": counter, "mode": mode, "u": SWITCHED}))
+        seen.add(Trajectory(TIMES, {"x": saw, "n": counter, "mode": mode, "u": SWITCHED}))
     return seen.text.splitlines()
 
 
@@ -43,3 +43,10 @@ def test_thresholds_and_conditions_are_told_of_changes_that_were_seen_several_ti
 def test_all_steps_of_a_counter_are_one_change() -> None:
     _, only = lines(2, np.floor(TIMES / 11.5), 0 * TIMES)
     assert only == "- n up, 16 times: x 1.991"
+
+
+def test_all_changes_are_counted_however_many_a_sample_has() -> None:
+    turns = np.floor(TIMES / 1.3)
+    for counter, told in ((turns % 2, "- n 0 -> 1, 76 times: "), (turns, "- n up, 152 times: ")):
+        line = lines(2, counter, 0 * TIMES, saw=np.mod(TIMES, 1.3))[1]
+        assert line.startswith(f"{told}x 1.2")
