@@ -40,7 +40,7 @@ def on_first(space: SearchSpace, *, is_named: bool) -> str:
 
 
 def on_time(space: SearchSpace, *, is_joint: bool) -> str:
-    """At which times to look; ``is_joint``: several things must happen together, and one of them decided."""
+    """At which times to look; ``is_joint``: samples tell when most of what must happen together did."""
     which, what = _NEAREST if is_joint else _DECIDED, "inputs" if space.inputs else "parameters"
     return _ON_TIME.format(which=which, what=what)
 

@@ -69,6 +69,7 @@ class _Sample:
     is_timed: bool = False  # whether the time that decided tells something
     failure: float = 0.0  # s for which what must recur failed in one piece
     closest: Mapping[Side, float] = field(default_factory=dict)  # how far what must happen together was off
+    has_nearest: bool = False  # whether it tells when a violation was nearest
 
 
 class Questions:
@@ -248,7 +249,7 @@ class Questions:
 
     def _advice(self) -> Iterator[str]:
         """How to use the samples with a verdict, of which there are some."""
-        is_flat, is_joint = self._is_flat(), any(s.closest for s in self._judged)
+        is_flat, is_joint = self._is_flat(), any(s.has_nearest and s.depth < _LINE for s in self._samples)
         is_ranked_otherwise = is_flat or self._best_first()[0].failure > 0
         if not is_ranked_otherwise and any(s.is_timed for s in self._judged):
             yield on_time(self._view.space, is_joint=is_joint)
@@ -330,6 +331,7 @@ class Questions:
             found.is_timed,
             found.failure,
             found.closest,
+            found.has_nearest,
         )
 
     def _alike(self, inputs: str) -> str:
