@@ -18,7 +18,7 @@ _ON_TIME = (
     "violating the requirement."
 )
 _DECIDED, _NEAREST = "that decided the robustness values", "at which a violation was nearest"
-_IMPROVING = "Samples improve: go on from the best ones, or combine what led on in several."
+_IMPROVING = "Samples improve: go on from the best ones, or combine what helped in several of them."
 _STUCK = (
     "The last two samples were no better: do not just repeat the best one with small changes, unless it was "
     "very close to a violation, but try a different strategy{such}."
