@@ -18,7 +18,7 @@ _ON_TIME = (
     "violating the requirement."
 )
 _DECIDED, _NEAREST = "that decided the robustness values", "at which a violation was nearest"
-_IMPROVING = "Samples improve: go on from the best ones, or combine what led on in several."
+_IMPROVING = "Samples improve: go on from the best ones, or combine what helped in several of them."
 _STUCK = (
     "The last two samples were no better: do not just repeat the best one with small changes, unless it was "
     "very close to a violation, but try a different strategy{such}."
@@ -40,7 +40,7 @@ def on_first(space: SearchSpace, *, is_named: bool) -> str:
 
 
 def on_time(space: SearchSpace, *, is_joint: bool) -> str:
-    """At which times to look; ``is_joint``: several things must happen together, and one of them decided."""
+    """At which times to look; ``is_joint``: samples tell when most of what must happen together did."""
     which, what = _NEAREST if is_joint else _DECIDED, "inputs" if space.inputs else "parameters"
     return _ON_TIME.format(which=which, what=what)
 

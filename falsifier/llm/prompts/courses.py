@@ -174,9 +174,8 @@ def course(
     ``clock`` is the number of decimals of times, ``tolerance`` the distance from the signal that is wanted,
     in its own unit, one number or one per time. Oscillations with at least the period ``slower_than`` are
     told point by point, if points suffice. What is less exact than ``claimed``, by default the largest
-    distance that is wanted, says so; beyond the share ``coarsest`` of the span, values at
-    some times and the extremes are told.
-    ``most`` limits the breakpoints beside those at the times ``kept``.
+    distance that is wanted, says so; beyond the share ``coarsest`` of the span, values at some times and the
+    extremes are told. ``most`` limits the breakpoints beside those at the times ``kept``.
     """
     allowed = np.broadcast_to(np.asarray(tolerance, dtype=np.float64), times.shape)
     kept, claimed = tuple(kept), float(allowed.max()) if claimed is None else claimed

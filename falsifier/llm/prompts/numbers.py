@@ -28,7 +28,7 @@ _ROUNDED_DIGITS = 15
 # Digits of the width of a range to which values of signals and parameters are shown.
 _DIGITS_OF_RANGE = 4
 _DIGITS_OF_PARAMETER = 5
-# Decimals beyond these of a value that has no more.
+# Decimals that a value may have beyond these to be told as it is.
 _MORE_DECIMALS = 3
 # Below the one and from the other on, numbers are written with exponents, as formulas write them.
 _TINY, _HUGE = 1e-4, 1e15

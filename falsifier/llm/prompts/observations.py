@@ -59,16 +59,24 @@ _MAX_SIGNALS = 16
 
 
 @dataclass(frozen=True, slots=True)
-class Observed:
-    """What is seen of one judged sample, in lines; more of it, less of it, and in one line."""
+class Signs:
+    """What a judged sample shows by which samples are ranked and advice is given."""
 
-    full: tuple[str, ...]
-    short: tuple[str, ...]
-    line: str
     is_timed: bool = False  # whether what decided changed over time, so that its time tells something
     failure: float = 0.0  # s for which what must recur failed in one piece; 0 if nothing must
     # How far each of what must happen together was from it at best, below 0 if it did.
     closest: Mapping[Side, float] = field(default_factory=dict)
+    has_nearest: bool = False  # whether it tells when a violation was nearest because most of it happened
+
+
+@dataclass(frozen=True, slots=True)
+class Observed:
+    """What is seen of one judged sample, in lines; more of it, less of it, and in one line; and its signs."""
+
+    full: tuple[str, ...]
+    short: tuple[str, ...]
+    line: str
+    signs: Signs = field(default_factory=Signs)
 
 
 def observed(view: View, evaluation: Evaluation) -> Observed:
@@ -92,10 +100,8 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     told_parts = tuple(_parts(view, diagnosis, over_time))
     parts = tuple(text for text, _ in told_parts)
     there = (_values_at(view, trajectory, verdict.critical_time, verdict.robustness),) if is_timed else ()
-    predicates = [
-        *_predicates(view, diagnosis, trajectory, over_time),
-        *_nearest(view, trajectory, over_time),
-    ]
+    nearest = tuple(_nearest(view, trajectory, over_time))
+    predicates = [*_predicates(view, diagnosis, trajectory, over_time), *nearest]
     if failure := longest_failure(view.requirement.formula, trajectory.times, over_time):
         values = _values_at(view, trajectory, failure[1], verdict.robustness)
         predicates.append(f"at the end of the longest failure in one piece, {values}")
@@ -108,9 +114,12 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
         (*reasons, *there, *parts, *discrete, *predicates, *continuous),
         (*reasons, *parts, *discrete, *predicates, *few_courses),
         "; ".join((line, *(brief for _, brief in told_parts[:1]))),
-        is_timed,
-        failure[1] - failure[0] if failure else 0.0,
-        closest(view.requirement.formula, over_time),
+        Signs(
+            is_timed=is_timed,
+            failure=failure[1] - failure[0] if failure else 0.0,
+            closest=closest(view.requirement.formula, over_time),
+            has_nearest=bool(nearest),
+        ),
     )
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass, field
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import one_line
-from falsifier.core.ranges import number_names
 from falsifier.core.words import counted, shortened
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
@@ -20,11 +19,11 @@ from falsifier.llm.messages import Message
 from falsifier.llm.prompts import published
 from falsifier.llm.prompts.advice import on_first, on_strategy, on_time
 from falsifier.llm.prompts.numbers import as_signals, number
-from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, observed
+from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, Signs, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.regularities import Regularities
 from falsifier.llm.prompts.standing import formula_text, standing
-from falsifier.llm.prompts.together import Side, apart, came_nearer, recurring
+from falsifier.llm.prompts.together import apart, came_nearer, recurring
 from falsifier.llm.prompts.tried import Tried
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.llm.usage import count_tokens
@@ -66,9 +65,7 @@ class _Sample:
     robustness: float | None  # None: there is no verdict
     progress: SampleProgress = field(default_factory=SampleProgress)
     is_first: bool = False  # whether it was the first to reach something
-    is_timed: bool = False  # whether the time that decided tells something
-    failure: float = 0.0  # s for which what must recur failed in one piece
-    closest: Mapping[Side, float] = field(default_factory=dict)  # how far what must happen together was off
+    signs: Signs = field(default_factory=Signs)
 
 
 class Questions:
@@ -100,7 +97,7 @@ class Questions:
         self._tried = Tried(view)
         self._regularities = Regularities(view)
         self._recurring = recurring(view.requirement.formula)
-        self._climb = Climb(_counting(view), "sample")
+        self._climb = Climb(view.counters, "sample")
 
     def tell(self, evaluation: Evaluation, *, doubt: str = "", why: str = "") -> None:
         """Add a sample.
@@ -227,9 +224,13 @@ class Questions:
             return
         if self._is_flat():
             yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations)
-        if self._recurring and ranked[0].failure:
+        if self._recurring and ranked[0].signs.failure:
             condition, limit = self._recurring.condition, self._recurring.length
-            longest = [f"{number(s.failure)} s in sample {s.number}" for s in ranked[:_NAMED] if s.failure]
+            longest = [
+                f"{number(s.signs.failure)} s in sample {s.number}"
+                for s in ranked[:_NAMED]
+                if s.signs.failure
+            ]
             yield _LONGEST.format(
                 condition=formula_text(condition), longest=", ".join(longest), limit=number(limit)
             )
@@ -237,7 +238,7 @@ class Questions:
             better = [s for s in ranked[:_NAMED] if s.robustness != ranked[-1].robustness]
             told = (f"{signed(s.robustness or 0.0, 3)} in sample {s.number}" for s in better)
             yield f"Lowest robustness so far: {', '.join(told)}."
-        if together := apart({s.number: s.closest for s in self._judged if s.closest}):
+        if together := apart({s.number: s.signs.closest for s in self._judged if s.signs.closest}):
             yield together
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
@@ -248,9 +249,12 @@ class Questions:
 
     def _advice(self) -> Iterator[str]:
         """How to use the samples with a verdict, of which there are some."""
-        is_flat, is_joint = self._is_flat(), any(s.closest for s in self._judged)
-        is_ranked_otherwise = is_flat or self._best_first()[0].failure > 0
-        if not is_ranked_otherwise and any(s.is_timed for s in self._judged):
+        is_flat, is_joint = (
+            self._is_flat(),
+            any(s.signs.has_nearest and s.depth < _LINE for s in self._samples),
+        )
+        is_ranked_otherwise = is_flat or self._best_first()[0].signs.failure > 0
+        if not is_ranked_otherwise and any(s.signs.is_timed for s in self._judged):
             yield on_time(self._view.space, is_joint=is_joint)
         if len(self._judged) > 2 or is_flat:
             yield on_strategy(self._view.space, is_flat=is_flat, is_stuck=self._is_stuck())
@@ -260,7 +264,7 @@ class Questions:
         before, last = self._judged[:-2], self._judged[-2:]
         if not before or self._best_first()[0] in last:
             return False
-        return not came_nearer([s.closest for s in last], [s.closest for s in before])
+        return not came_nearer([s.signs.closest for s in last], [s.signs.closest for s in before])
 
     def _is_flat(self) -> bool:
         """Whether several samples had the same robustness, and none had another."""
@@ -272,9 +276,9 @@ class Questions:
 
         Otherwise, where the robustness is flat, by how far their signals got.
         """
-        if self._is_flat() and not any(s.failure for s in self._judged):
+        if self._is_flat() and not any(s.signs.failure for s in self._judged):
             return sorted(self._judged, key=lambda s: self._reached.rank(s.progress), reverse=True)
-        return sorted(self._judged, key=lambda s: (-s.failure, s.robustness or 0.0, s.number))
+        return sorted(self._judged, key=lambda s: (-s.signs.failure, s.robustness or 0.0, s.number))
 
     def _left(self, budget: int | None) -> str:
         if budget is None:
@@ -330,9 +334,7 @@ class Questions:
             verdict.robustness,
             progress,
             is_first,
-            found.is_timed,
-            found.failure,
-            found.closest,
+            found.signs,
         )
 
     def _alike(self, inputs: str) -> str:
@@ -388,13 +390,3 @@ class Questions:
 
 def _text(inputs: Sequence[str], *lines: str) -> str:
     return "\n  ".join(("; ".join(inputs), *(line for line in lines if line)))
-
-
-def _counting(view: View) -> dict[str, dict[int, str]]:
-    """Signals that may count up, with the names of their values; none where no types are told.
-
-    Those of the requirement, or all recorded ones if none of them may.
-    """
-    recorded = map(view.variable, view.recorded)
-    may = {v.name: number_names(v.kind, v.items) for v in recorded if v.kind in ("integer", "enumeration")}
-    return {name: may[name] for name in view.formula_outputs if name in may} or may

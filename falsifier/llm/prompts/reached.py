@@ -21,7 +21,8 @@ Stage = tuple[str, float | None, float]
 _FURTHER = 0.05
 # New things that are told, of these those of one signal, and times of changes.
 _MOST_NEW, _MOST_OF_ONE, _MOST_SWITCHES = 8, 3, 8
-# New changes of a signal of the requirement up to which it is a mode, and no counter.
+# New changes of a signal of the requirement up to which it is a mode, and no counter; changes of others up to
+# which all of them are told again.
 _MOST_OF_MODE = 6
 # Outputs and inputs that are told at each new change; what changed there by more than this share of its span
 # is told with its value before, too.
@@ -34,7 +35,8 @@ class SampleProgress:
 
     stages: frozenset[Stage] = frozenset()
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    # Changes by the index at which each came first, and where those of the requirement's signals came again.
+    # Changes by the index at which each came first; where signals of the requirement, and those that seldom
+    # change, did so.
     changes: Mapping[int, tuple[Stage, ...]] = field(default_factory=dict)
     again: frozenset[int] = frozenset()
 
@@ -91,7 +93,8 @@ class Reached:
         """When discrete signals changed, and other signals at that time.
 
         Told are changes that no earlier sample made, those of the requirement's signals before others; then
-        others of the requirement's signals. It is to be called before the sample is added.
+        others of the requirement's signals, and of those that seldom change. It is to be called before the
+        sample is added.
         """
         judged, new = self._view.formula_outputs, self.new_changes(progress)
         few = self._few(new, but_all_of=judged)

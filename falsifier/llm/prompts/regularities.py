@@ -24,8 +24,10 @@ _COUNTS = 7
 # What is not discrete jumps where it changes in one step by this share of its span, and so many times as much
 # as in the steps beside that.
 _JUMP, _ALONE = 0.03, 4.0
-# Changes of one signal in a sample, and times of a sample, that are looked at.
-_MOST_OF_SAMPLE, _TIMES = 50, 100
+# A signal that changes more often in a sample chatters, and nothing is told of it.
+_CHATTERS = 200
+# Times of a sample that are looked at for the values that signals have.
+_TIMES = 100
 
 _HEAD = (
     "So far, other signals just before each change of a discrete signal, or jump of another one, and inputs "
@@ -43,6 +45,7 @@ class Regularities:
     _seen: defaultdict[str, defaultdict[tuple[str, bool], list[Array]]] = field(
         default_factory=lambda: defaultdict(lambda: defaultdict(list))
     )
+    _chattering: set[str] = field(default_factory=set)
 
     def add(self, trajectory: Trajectory) -> None:
         """Add a sample."""
@@ -57,7 +60,9 @@ class Regularities:
         for name in self.view.recorded:
             column = inside[name]
             changes = np.flatnonzero(np.diff(column)) + 1 if name in discrete else _jumps(column)
-            for k in changes[:_MOST_OF_SAMPLE].tolist():
+            if len(changes) > _CHATTERS:
+                self._chattering.add(name)
+            for k in changes[:_CHATTERS].tolist():
                 is_up = bool(column[k] > column[k - 1])
                 ends = (self._value(name, v, 6) for v in column[k - 1 : k + 1].tolist())
                 change = " -> ".join(ends) if name in discrete else f"jumps {'up' if is_up else 'down'}"
@@ -66,7 +71,8 @@ class Regularities:
     @property
     def text(self) -> str:
         """What was so each time, in a line for each change, those of the requirement's signals first."""
-        lines = [line for name in self.view.recorded if name in self._seen for line in self._of(name)]
+        names = (n for n in self.view.recorded if n in self._seen and n not in self._chattering)
+        lines = [line for name in names for line in self._of(name)]
         lines.sort(key=lambda line: " jumps " in line)
         return "\n".join((_HEAD, *lines[:_MOST_TOLD])) if lines else ""
 

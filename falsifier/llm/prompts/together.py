@@ -97,7 +97,7 @@ def apart(samples: Mapping[int, Mapping[Side, float]]) -> str:
         found &= set(nearest)
         where = f"sample{'s' * (len(nearest) > 1)} {listed([*map(str, nearest[:_MOST_NEAREST])])}"
         if len(nearest) > _MOST_NEAREST:
-            where = f"{len(nearest)} samples, the first of them {nearest[0]}"
+            where = f"{len(nearest)} samples, first in sample {nearest[0]}"
         words.append(
             f"{side} in {where}" if least == 0 else f"{side} in none, off by {shown(least):.4g} in {where}"
         )

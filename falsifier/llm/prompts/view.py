@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from falsifier.context.values import Context
 from falsifier.core.experiment import Experiment
 from falsifier.core.model import ModelInfo, Variable
+from falsifier.core.ranges import number_names
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory, is_discrete
 from falsifier.errors import SpecError, did_you_mean
@@ -109,6 +110,18 @@ class View:
         sizes = np.cumsum([_BYTES_OF_LINE + len(text) for text in texts])
         asked.update(others[: int(np.searchsorted(sizes, _MOST_OF_OTHERS, side="right"))])
         return tuple(n for n in dict.fromkeys((*self.formula_outputs, *outputs)) if n in asked)
+
+    @property
+    def counters(self) -> dict[str, dict[int, str]]:
+        """Signals that may count up, with the names of their values; none where no types are told.
+
+        Those of the requirement, or all recorded ones if none of them may.
+        """
+        recorded = map(self.variable, self.recorded)
+        may = {
+            v.name: number_names(v.kind, v.items) for v in recorded if v.kind in ("integer", "enumeration")
+        }
+        return {name: may[name] for name in self.formula_outputs if name in may} or may
 
     @property
     def untold(self) -> frozenset[str]:

@@ -157,10 +157,10 @@ def test_the_time_that_decided_is_left_out_where_all_times_would_have() -> None:
         "why: x = 1 is below 2 at all times.",
         "x: constant 1",
     ]
-    assert not observed(view, evaluation).is_timed
+    assert not observed(view, evaluation).signs.is_timed
     (why,) = [t for t in facts(*seen("x <= 2 or G[1,2] (x >= 9)", TIMES / 5)) if t.startswith("why: ")]
     assert "x = 0 is below 2" in why and "at all times" not in why
-    assert observed(*seen("G[0,10] (x <= 9)", TIMES.copy())).is_timed
+    assert observed(*seen("G[0,10] (x <= 9)", TIMES.copy())).signs.is_timed
 
 
 def test_a_line_tells_the_margins_of_the_parts() -> None:

@@ -318,6 +318,21 @@ def test_ranges_in_which_the_same_was_not_tried_are_told_together() -> None:
     assert tried.gaps == "u and v above 0.1 up to 1; w above 0.5 up to 1"
 
 
+@pytest.mark.parametrize(
+    ("formula", "which"),
+    [
+        ("G (x <= 0.5 or u >= -0.5)", "at which a violation was nearest"),
+        ("G (x <= 5 or u >= -2)", "that decided the robustness values"),  # neither came about
+        ("G (x <= 0.9)", "that decided the robustness values"),
+    ],
+)
+def test_the_times_to_look_at_are_told_of_samples(formula: str, which: str) -> None:
+    problem = lag_problem(formula)
+    _, changing = told(problem, "MP5", sampled(problem, [1.0, 1.0, -1.0, -1.0], [0.0, 1.0, 1.0, -1.0]))
+    assert f"Look at the times {which}, and" in changing
+    assert ("nearest to a violation while" in changing) == ("nearest" in which)
+
+
 def test_how_to_go_on_follows_from_whether_the_last_two_samples_were_better() -> None:
     falling = [[0.1] * 5, [0.3] * 5, [0.5] * 5]
     better, worse = (asked_each(PROBLEM, sampled(PROBLEM, *each)) for each in (falling, falling[::-1]))

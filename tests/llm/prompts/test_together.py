@@ -101,3 +101,10 @@ def test_samples_come_nearer_in_one_of_what_must_happen_together() -> None:
     assert not came_nearer([first], [first, better])
     assert not came_nearer([met | {right: -3.0}], [met]), "there is no nearer than met"
     assert not came_nearer([{}], [{}])
+
+
+def test_of_many_samples_their_number_and_the_first_are_told() -> None:
+    one, other = (Side(parse(text), must_hold=True) for text in ("x >= 1", "y >= 1"))
+    samples = {n: {one: -1.0, other: 2.0} for n in range(2, 7)} | {7: {one: 3.0, other: -1.0}}
+    told = "x >= 1 holds in 5 samples, first in sample 2; y >= 1 holds in sample 7"
+    assert apart(samples) == f"Of what a violation needs at one time: {told}."
