@@ -66,7 +66,6 @@ class Signs:
     failure: float = 0.0  # s for which what must recur failed in one piece; 0 if nothing must
     # How far each of what must happen together was from it at best, below 0 if it did.
     closest: Mapping[Side, float] = field(default_factory=dict)
-    has_nearest: bool = False  # whether it tells when a violation was nearest because most of it happened
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +99,10 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     told_parts = tuple(_parts(view, diagnosis, over_time))
     parts = tuple(text for text, _ in told_parts)
     there = (_values_at(view, trajectory, verdict.critical_time, verdict.robustness),) if is_timed else ()
-    nearest = tuple(_nearest(view, trajectory, over_time))
-    predicates = [*_predicates(view, diagnosis, trajectory, over_time), *nearest]
+    predicates = [
+        *_predicates(view, diagnosis, trajectory, over_time),
+        *_nearest(view, trajectory, over_time),
+    ]
     if failure := longest_failure(view.requirement.formula, trajectory.times, over_time):
         values = _values_at(view, trajectory, failure[1], verdict.robustness)
         predicates.append(f"at the end of the longest failure in one piece, {values}")
@@ -118,7 +119,6 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
             is_timed=is_timed,
             failure=failure[1] - failure[0] if failure else 0.0,
             closest=closest(view.requirement.formula, over_time),
-            has_nearest=bool(nearest),
         ),
     )
 

@@ -17,7 +17,7 @@ from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import published
-from falsifier.llm.prompts.advice import on_first, on_strategy, on_time
+from falsifier.llm.prompts.advice import on_first, on_next
 from falsifier.llm.prompts.numbers import as_signals, number
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, Signs, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
@@ -249,15 +249,11 @@ class Questions:
 
     def _advice(self) -> Iterator[str]:
         """How to use the samples with a verdict, of which there are some."""
-        is_flat, is_joint = (
-            self._is_flat(),
-            any(s.signs.has_nearest and s.depth < _LINE for s in self._samples),
-        )
-        is_ranked_otherwise = is_flat or self._best_first()[0].signs.failure > 0
-        if not is_ranked_otherwise and any(s.signs.is_timed for s in self._judged):
-            yield on_time(self._view.space, is_joint=is_joint)
-        if len(self._judged) > 2 or is_flat:
-            yield on_strategy(self._view.space, is_flat=is_flat, is_stuck=self._is_stuck())
+        is_flat, is_joint = self._is_flat(), any(s.signs.closest for s in self._judged)
+        is_ranked_otherwise = is_flat or is_joint or self._best_first()[0].signs.failure > 0
+        is_timed = not is_ranked_otherwise and any(s.signs.is_timed for s in self._judged)
+        stuck = self._is_stuck()
+        yield from on_next(self._view.space, is_timed=is_timed, is_flat=is_flat, is_stuck=stuck)
 
     def _is_stuck(self) -> bool:
         """Whether the last two samples were no better than those before, also in nothing that is needed."""

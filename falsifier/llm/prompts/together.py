@@ -101,7 +101,7 @@ def apart(samples: Mapping[int, Mapping[Side, float]]) -> str:
         words.append(
             f"{side} in {where}" if least == 0 else f"{side} in none, off by {shown(least):.4g} in {where}"
         )
-    return f"Of what a violation needs at one time: {'; '.join(words)}." if words and not found else ""
+    return f"Of what a violation needs together: {'; '.join(words)}." if words and not found else ""
 
 
 def came_nearer(last: Sequence[Mapping[Side, float]], before: Sequence[Mapping[Side, float]]) -> bool:

@@ -14,6 +14,8 @@ from falsifier.llm.prompts.view import View
 _WIDE = 0.3
 # Values of an interpolated input that count as tried, values that are listed, digits of the others.
 _VALUES, _MOST_LISTED, _DIGITS = 100, 6, 2
+# More different ranges, most of which do not matter, are not told.
+_MOST_GAPS = 4
 
 
 @dataclass(slots=True)
@@ -35,12 +37,14 @@ class Tried:
 
     @property
     def gaps(self) -> str:
-        """What no sample tried; empty if they tried about all."""
+        """What no sample tried; empty if they tried about all, or left out too many different ranges."""
         alike: dict[str, list[str]] = {}
         for r in self.view.space.ranges:
             if gap := self._gap(r):
                 alike.setdefault(gap, []).append(r.name)
-        return "; ".join(f"{listed(names)} {gap}" for gap, names in alike.items())
+        return "; ".join(f"{listed(names)} {gap}" for gap, names in alike.items()) * (
+            len(alike) <= _MOST_GAPS
+        )
 
     def _gap(self, r: Range) -> str:
         tried = sorted(self._values.get(r.name, ()))

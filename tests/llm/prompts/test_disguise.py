@@ -150,6 +150,6 @@ def test_a_signal_that_starts_at_a_parameter_of_its_name_is_told_so() -> None:
     view = Disguise.of(replace(View.of(problem), info=twice)).view
     assert "- start value p1; from -1 to 1" in standing(view, VARIANTS["MP5"])
     first = Questions(view, VARIANTS["MP5"]).ask()[1].content
-    assert first.startswith("The limits of the ranges are good first samples"), (
+    assert first.startswith("Good first samples are the limits of the ranges"), (
         "neutral names suggest nothing"
     )

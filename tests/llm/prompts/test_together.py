@@ -91,7 +91,7 @@ def test_in_which_samples_each_of_what_a_violation_needs_happened(formula: str, 
     monitor = compiled(parsed, 1.0, len(TIMES))
     found = [closest(parsed, monitor.courses(t)) for t in (TRAJECTORY, other, TRAJECTORY)]
     text = apart({n: sides for n, sides in enumerate(found, start=1) if sides})
-    assert text == (f"Of what a violation needs at one time: {told}." if told else "")
+    assert text == (f"Of what a violation needs together: {told}." if told else "")
 
 
 def test_samples_come_nearer_in_one_of_what_must_happen_together() -> None:
@@ -107,4 +107,4 @@ def test_of_many_samples_their_number_and_the_first_are_told() -> None:
     one, other = (Side(parse(text), must_hold=True) for text in ("x >= 1", "y >= 1"))
     samples = {n: {one: -1.0, other: 2.0} for n in range(2, 7)} | {7: {one: 3.0, other: -1.0}}
     told = "x >= 1 holds in 5 samples, first in sample 2; y >= 1 holds in sample 7"
-    assert apart(samples) == f"Of what a violation needs at one time: {told}."
+    assert apart(samples) == f"Of what a violation needs together: {told}."
