@@ -22,6 +22,9 @@ Points = tuple[tuple[float, float, float], ...]
 SHOWN_CHANGES = 24
 # Stays are equal up to this share of them.
 _EQUAL_STAYS = 1e-6
+# A signal jumps where it changes in one step by this share of its span, and so many times as much as in the
+# steps beside that.
+_JUMP, _ALONE = 0.03, 4.0
 # So many changes by the same amount, after the same time, are told together.
 _REGULAR = 4
 # Breakpoints of one signal; a signal that needs more is told less exactly, and how exactly.
@@ -113,6 +116,17 @@ def _pieces(times: Array, column: Array) -> list[tuple[float, float, float]]:
     starts = [0, *(np.flatnonzero(np.diff(column)) + 1).tolist()]
     ends = [*starts[1:], len(times) - 1]
     return [(float(column[a]), float(times[a]), float(times[b])) for a, b in zip(starts, ends, strict=True)]
+
+
+def jumps(column: Array) -> NDArray[np.intp]:
+    """Indices at which a signal changes in one step, by much more than in the steps before and after.
+
+    >>> jumps(np.array([0.0, 0.1, 2.0, 2.1, 2.2])).tolist()
+    [2]
+    """
+    size = np.abs(np.diff(column))
+    beside = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
+    return np.flatnonzero((size >= _JUMP * np.ptp(column)) & (size > _ALONE * beside)) + 1
 
 
 def longest_stretch(times: Array, wrong: NDArray[np.bool_]) -> tuple[float, float] | None:

@@ -366,12 +366,16 @@ def _input_steps(view: View, evaluation: Evaluation) -> tuple[float, ...]:
 
 
 def _deciding(view: View, verdict: Verdict, inside: Trajectory) -> dict[str, Array]:
-    """What the deciding predicate compares, unless it is discrete."""
+    """What the deciding predicate compares, unless it is discrete; of an absolute value the signal."""
     predicates = view.requirement.formula.predicates
     deciding = [p for p in predicates if str(p) == verdict.predicate] or predicates
-    sides = {str(side) for p in deciding for side in p.sides}
-    compared = compared_columns(view, inside).items()
-    return {text: c for text, c in compared if text in sides and not view.is_discrete(text, c)}
+    sides = {str(side): side for p in deciding for side in p.sides}
+    columns = {text: c for text, c in compared_columns(view, inside).items() if text in sides}
+    for text, side in sides.items():
+        if text in columns and _is_folded(side, view.recorded):
+            del columns[text]
+            columns |= {name: inside[name] for name in side.signals}
+    return {text: c for text, c in columns.items() if not view.is_discrete(text, c)}
 
 
 def _decimals(view: View, column: Array, name: str, robustness: float) -> int:

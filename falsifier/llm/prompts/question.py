@@ -22,6 +22,7 @@ from falsifier.llm.prompts.numbers import as_signals, number
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, Signs, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.regularities import Regularities
+from falsifier.llm.prompts.relations import Relations
 from falsifier.llm.prompts.standing import formula_text, standing
 from falsifier.llm.prompts.together import apart, came_nearer, recurring
 from falsifier.llm.prompts.tried import Tried
@@ -95,7 +96,7 @@ class Questions:
         self._inputs: dict[str, int] = {}
         self._reached = Reached(view)
         self._tried = Tried(view)
-        self._regularities = Regularities(view)
+        self._regularities, self._relations = Regularities(view), Relations(view)
         self._recurring = recurring(view.requirement.formula)
         self._climb = Climb(view.counters, "sample")
 
@@ -120,6 +121,7 @@ class Questions:
                     values = (*self._start[name], at_start[name])
                     self._start[name] = (min(values), max(values))
                 self._regularities.add(evaluation.trajectory)
+                self._relations.add(evaluation.trajectory)
             self._shorten()
 
     def ask(
@@ -204,8 +206,7 @@ class Questions:
             yield f"{first}Propose the first {wanted}."
             return
         yield from self._standings()
-        if regular := self._regularities.text:
-            yield regular
+        yield from filter(None, (self._relations.text, self._regularities.text))
         yield from notes
         if lessons and self._variant.has("lessons"):
             yield f"Your lessons so far: {lessons}"

@@ -11,6 +11,7 @@ import numpy as np
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import resolving
+from falsifier.llm.prompts.courses import jumps
 from falsifier.llm.prompts.numbers import column_decimals, fine_clock, number, plain
 from falsifier.llm.prompts.view import View
 
@@ -24,9 +25,8 @@ _MOST_NEW, _MOST_OF_ONE, _MOST_SWITCHES = 8, 3, 8
 # New changes of a signal of the requirement up to which it is a mode, and no counter; changes of others up to
 # which all of them are told again.
 _MOST_OF_MODE = 6
-# Outputs and inputs that are told at each new change; what changed there by more than this share of its span
-# is told with its value before, too.
-_MOST_BESIDE, _JUMP = 6, 0.05
+# Outputs and inputs that are told at each new change; of more inputs those that jump there.
+_MOST_BESIDE = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +108,10 @@ class Reached:
         times = {k for k, found in progress.changes.items() if any(c in few for c in found)} | progress.again
         told = sorted(sorted(times, key=urgency)[:_MOST_SWITCHES])
         inputs = [r.name for r in self._view.space.inputs if r.name in trajectory.columns]
-        names = [*list(progress.ranges)[:_MOST_BESIDE], *(inputs if len(inputs) <= _MOST_BESIDE else ())]
-        texts = (self._change(progress, trajectory, names, k) for k in told)
+        outputs, texts = list(progress.ranges)[:_MOST_BESIDE], list[str]()
+        for k in told:
+            beside = [n for n in inputs if len(inputs) <= _MOST_BESIDE or k in jumps(trajectory[n])]
+            texts.append(self._change(progress, trajectory, [*outputs, *beside[:_MOST_BESIDE]], k))
         known = {c for k in told for c in progress.changes.get(k, ())}
         is_all = known.issuperset(new) and progress.again <= set(told)
         return "; ".join((*texts, *([] if is_all else ["..."])))
@@ -120,8 +122,7 @@ class Reached:
 
         def beside(name: str) -> str:
             column = columns[name]
-            jumps = abs(column[k] - column[k - 1]) > _JUMP * np.ptp(column)
-            values = column[k - 1 : k + 1] if jumps else column[k : k + 1]
+            values = column[k - 1 : k + 1] if k in jumps(column) else column[k : k + 1]
             decimals = column_decimals(column)
             told = (self._view.labelled(name, v, plain(v, decimals)) for v in values.tolist())
             return f"{name} {' -> '.join(told)}"

@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.llm.prompts.courses import Array
+from falsifier.llm.prompts.courses import Array, jumps
 from falsifier.llm.prompts.numbers import column_decimals, plain
 from falsifier.llm.prompts.view import View
 
@@ -21,9 +20,6 @@ _MOST_TOLD, _MOST_CONDITIONS = 6, 4
 _NARROW, _SELDOM, _CHANCE = 0.1, 0.6, 0.1
 # A signal with so many different changes counts: all that lead up are told together, and all that lead down.
 _COUNTS = 7
-# What is not discrete jumps where it changes in one step by this share of its span, and so many times as much
-# as in the steps beside that.
-_JUMP, _ALONE = 0.03, 4.0
 # A signal that changes more often in a sample chatters, and nothing is told of it.
 _CHATTERS = 200
 # Times of a sample that are looked at for the values that signals have.
@@ -59,7 +55,7 @@ class Regularities:
         discrete = self.view.discrete(inside)
         for name in self.view.recorded:
             column = inside[name]
-            changes = np.flatnonzero(np.diff(column)) + 1 if name in discrete else _jumps(column)
+            changes = np.flatnonzero(np.diff(column)) + 1 if name in discrete else jumps(column)
             if len(changes) > _CHATTERS:
                 self._chattering.add(name)
             for k in changes[:_CHATTERS].tolist():
@@ -123,10 +119,3 @@ def _ranges(values: Array, span: float) -> list[tuple[float, float]]:
         parts = np.split(ordered, [int(np.diff(ordered).argmax()) + 1])
     is_narrow = sum(map(np.ptp, parts)) <= _NARROW * span and min(map(len, parts)) >= len(parts)
     return [(float(part[0]), float(part[-1])) for part in parts] if is_narrow else []
-
-
-def _jumps(column: Array) -> NDArray[np.intp]:
-    """Indices at which a signal changes at once, more than it moves before and after."""
-    size = np.abs(np.diff(column))
-    beside = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
-    return np.flatnonzero((size >= _JUMP * np.ptp(column)) & (size > _ALONE * beside)) + 1

@@ -192,3 +192,10 @@ def test_a_part_that_has_no_value_where_it_does_not_matter_is_told_where_it_does
     assert any((e.trajectory["x"] < -0.2).any() for e in judged if e.trajectory is not None)
     for evaluation in judged:
         assert any("sqrt(x + 0.2) <= 9, from 0 to 0.5 s" in line for line in observed(view, evaluation).full)
+
+
+def test_in_short_the_course_of_a_signal_is_told_and_not_of_its_absolute_value() -> None:
+    swings = observed(*seen("G[0,10] (abs(x) <= 2)", np.sin(TIMES)))
+    for lines in (swings.full, swings.short):
+        assert not any(each.startswith("abs(x): ") for each in lines)
+        assert any(each.startswith("x: ") for each in lines)

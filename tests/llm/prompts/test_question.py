@@ -253,6 +253,18 @@ def test_of_a_counter_that_rises_far_its_first_values_and_the_last_are_told() ->
         assert reached.news(progress) == values
 
 
+def test_of_many_inputs_those_that_jump_at_a_change_are_told() -> None:
+    names = [f"u{k}" for k in range(1, 9)]
+    space = SearchSpace(tuple(InputRange(n, 0, 1, control_points=2) for n in names), (), 10.0)
+    info = ModelInfo("m", variables=(Variable("x", kind="boolean"),))
+    view = replace(View.of(lag_problem("G[0,10] (x <= 0.9)")), info=info, space=space)
+    times = np.linspace(0.0, 10.0, 101)
+    columns = {name: np.where(times >= k, 1.0, 0.0) for k, name in enumerate(names, start=1)}
+    trajectory = Trajectory(times, {"x": np.where(times >= 3, 1.0, 0.0), **columns})
+    told = Reached(view).switches(SampleProgress.of(view, trajectory), trajectory)
+    assert told == "x 0 -> 1 at 3 s (u3 0 -> 1)"
+
+
 def test_the_first_changes_of_a_counter_are_the_first_in_time() -> None:
     view = View.of(lag_problem("G[0,10] (x <= 0.9)"))
     kinds = (Variable("x", kind="boolean"), Variable("n", kind="integer"))
