@@ -18,6 +18,7 @@ from falsifier.evaluation.levels import Climb
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import published
 from falsifier.llm.prompts.advice import on_first, on_next
+from falsifier.llm.prompts.combinations import Combinations
 from falsifier.llm.prompts.numbers import as_signals, number
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, Signs, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
@@ -96,7 +97,8 @@ class Questions:
         self._inputs: dict[str, int] = {}
         self._reached = Reached(view)
         self._tried = Tried(view)
-        self._regularities, self._relations = Regularities(view), Relations(view)
+        self._patterns = (Relations(view), Regularities(view))
+        self._combinations = Combinations(view)
         self._recurring = recurring(view.requirement.formula)
         self._climb = Climb(view.counters, "sample")
 
@@ -120,8 +122,8 @@ class Questions:
                 for name in self._start.keys() & at_start.keys():
                     values = (*self._start[name], at_start[name])
                     self._start[name] = (min(values), max(values))
-                self._regularities.add(evaluation.trajectory)
-                self._relations.add(evaluation.trajectory)
+                for collected in (*self._patterns, self._combinations):
+                    collected.add(evaluation.trajectory)
             self._shorten()
 
     def ask(
@@ -206,7 +208,7 @@ class Questions:
             yield f"{first}Propose the first {wanted}."
             return
         yield from self._standings()
-        yield from filter(None, (self._relations.text, self._regularities.text))
+        yield from filter(None, (pattern.text for pattern in self._patterns))
         yield from notes
         if lessons and self._variant.has("lessons"):
             yield f"Your lessons so far: {lessons}"
@@ -246,7 +248,7 @@ class Questions:
             yield "\n".join((*few, *self._climb.lines))
         if self._climb.is_told or self._is_flat() or self._is_stuck():
             untried = _UNTRIED.format(gaps) if (gaps := self._tried.gaps) else ""
-            yield from (text for text in (self._reached.extent, untried) if text)
+            yield from filter(None, (self._reached.extent, untried, self._combinations.text))
 
     def _advice(self) -> Iterator[str]:
         """How to use the samples with a verdict, of which there are some."""

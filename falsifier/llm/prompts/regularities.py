@@ -27,7 +27,7 @@ _TIMES = 100
 
 _HEAD = (
     "So far, other signals just before each change of a discrete signal, or jump of another one, and inputs "
-    "at that time, were:"
+    "at that time, were as follows; what samples with the same beginning share counts once:"
 )
 
 

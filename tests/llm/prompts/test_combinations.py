@@ -1,0 +1,36 @@
+"""Values of discrete signals that were never there together, of columns made for it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from falsifier.core.model import ModelInfo, Variable
+from falsifier.core.ranges import InputRange
+from falsifier.core.trajectory import Trajectory
+from falsifier.llm.prompts import View
+from falsifier.llm.prompts.combinations import Combinations
+from falsifier.testing import lag_problem
+
+TIMES = np.linspace(0.0, 10.0, 101)
+ON, LATE, KEY = ((start <= TIMES).astype(np.float64) for start in (2.0, 6.0, 9.0))
+
+
+def test_the_likeliest_combinations_that_never_came_about_are_told_first() -> None:
+    info = ModelInfo("m", variables=(Variable("x", kind="integer"), Variable("mode", kind="boolean")))
+    view = View.of(lag_problem("G (x <= 0.9)"))
+    keys = tuple(InputRange(name, 0, 1, control_points=2, kind="boolean") for name in ("key", "lock"))
+    space = replace(view.space, inputs=keys)
+    experiment = replace(view.experiment, outputs=("x", "mode"))
+    seen = Combinations(replace(view, info=info, space=space, experiment=experiment))
+    seen.add(Trajectory(TIMES, {"x": ON, "mode": LATE, "key": KEY, "lock": 1 - KEY}))
+    told = "mode 1 with x 0; mode 0 with key 1; mode 0 with lock 0; x 0 with key 1; x 0 with lock 0"
+    found = seen.text.removeprefix("Never at one time so far: ").removesuffix(".").split("; ")
+    assert {frozenset(each.split(" with ")) for each in found} == {
+        frozenset(each.split(" with ")) for each in told.split("; ")
+    }, "inputs are the language model's own business"
+    assert found[0] in ("mode 1 with x 0", "x 0 with mode 1")
+    seen.add(Trajectory(TIMES, {"x": 1 - ON, "mode": LATE, "key": KEY, "lock": 1 - KEY}))
+    assert "x" not in seen.text
+    many = Combinations(replace(view, info=info, experiment=experiment))
+    many.add(Trajectory(TIMES, {"x": TIMES // 1, "mode": LATE, "u": 0 * TIMES}))
+    assert many.text == "", "a counter has too many values"
