@@ -229,11 +229,8 @@ class Questions:
             yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations)
         if self._recurring and ranked[0].signs.failure:
             condition, limit = self._recurring.condition, self._recurring.length
-            longest = [
-                f"{number(s.signs.failure)} s in sample {s.number}"
-                for s in ranked[:_NAMED]
-                if s.signs.failure
-            ]
+            failed = [(s.number, s.signs.failure) for s in ranked[:_NAMED] if s.signs.failure]
+            longest = [f"{number(length)} s in sample {n}" for n, length in failed]
             yield _LONGEST.format(
                 condition=formula_text(condition), longest=", ".join(longest), limit=number(limit)
             )
