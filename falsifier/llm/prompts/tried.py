@@ -42,9 +42,8 @@ class Tried:
         for r in self.view.space.ranges:
             if gap := self._gap(r):
                 alike.setdefault(gap, []).append(r.name)
-        return "; ".join(f"{listed(names)} {gap}" for gap, names in alike.items()) * (
-            len(alike) <= _MOST_GAPS
-        )
+        told = (f"{listed(names)} {gap}" for gap, names in alike.items())
+        return "; ".join(told) if len(alike) <= _MOST_GAPS else ""
 
     def _gap(self, r: Range) -> str:
         tried = sorted(self._values.get(r.name, ()))

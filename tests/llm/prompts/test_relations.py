@@ -32,6 +32,7 @@ def test_what_signals_are_made_of_is_told_in_the_simplest_way_and_once() -> None
     other = sample | {"error": u - x + 0.1, "still": 0.5 * x}
     assert relations(sample, other) == "In all samples so far: less = -x; copy = u."
     assert relations({"x": x, "other": np.sin(3 * TIMES), "still": still, "u": u}) == ""
+    assert relations({"x": x, "still": still, "quiet": still, "u": u}) == "", "of nothing that moved"
 
 
 def test_a_relation_that_fails_at_one_time_or_whose_signals_are_missing_is_not_told() -> None:
