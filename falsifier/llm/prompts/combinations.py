@@ -17,9 +17,10 @@ _MOST_VALUES, _MOST_SIGNALS, _MOST_TOLD = 6, 12, 8
 
 @dataclass(slots=True)
 class Combinations:
-    """Collects the values that discrete signals and inputs had together."""
+    """Collects the values that discrete signals and inputs had together; drops what proves to be neither."""
 
     view: View
+    _left: list[str] | None = None  # None: no sample was seen
     _times: defaultdict[str, Counter[float]] = field(default_factory=lambda: defaultdict(Counter))
     _seen: defaultdict[tuple[str, str], set[tuple[float, float]]] = field(
         default_factory=lambda: defaultdict(set)
@@ -28,14 +29,23 @@ class Combinations:
     def add(self, trajectory: Trajectory) -> None:
         """Add a sample."""
         inside = self.view.inside(trajectory)
-        inputs = [r.name for r in self.view.space.inputs if r.kind != "real" and r.name in inside.columns]
-        names = [*list(self.view.discrete(inside))[:_MOST_SIGNALS], *inputs[:_MOST_SIGNALS]]
-        for name in names:
-            values, counts = np.unique(inside[name], return_counts=True)
+        names = self._possible(inside) if self._left is None else self._left
+        columns = {name: inside[name] for name in names if name in inside.columns}
+        for name, column in columns.items():
+            values, counts = np.unique(column, return_counts=True)
             self._times[name].update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
-        for one, two in combinations(dict.fromkeys(names), 2):
-            pairs = np.unique(np.stack((inside[one], inside[two])), axis=1)
-            self._seen[one, two].update(map(tuple, pairs.T.tolist()))
+        self._left = [n for n in columns if _has_few_whole_values(self._times[n])]
+        if self._left:
+            states = np.unique(np.stack([columns[n] for n in self._left]), axis=1).tolist()
+            for (one, these), (two, those) in combinations(zip(self._left, states, strict=True), 2):
+                self._seen[one, two].update(zip(these, those, strict=True))
+
+    def _possible(self, inside: Trajectory) -> list[str]:
+        """Those that are discrete, or may prove so as they have not moved yet."""
+        discrete = self.view.discrete(inside)
+        still = [n for n in self.view.recorded if n in inside.columns and np.ptp(inside[n]) == 0]
+        inputs = [r.name for r in self.view.space.inputs if r.kind != "real"]
+        return [*list(dict.fromkeys((*discrete, *still)))[:_MOST_SIGNALS], *inputs[:_MOST_SIGNALS]]
 
     @property
     def text(self) -> str:
@@ -45,10 +55,10 @@ class Combinations:
 
     def _never(self) -> Iterator[tuple[float, str]]:
         searched = self.view.space.names
-        few = {name: times for name, times in self._times.items() if 1 < len(times) <= _MOST_VALUES}
-        for (one, two), seen in self._seen.items():
-            if not (one in few and two in few) or (one in searched and two in searched):
+        for one, two in combinations(self._left or (), 2):
+            if one in searched and two in searched:
                 continue
+            few, seen = self._times, self._seen[one, two]
             for a, b in product(few[one], few[two]):
                 if (a, b) not in seen:
                     expected = few[one][a] * few[two][b] / few[two].total()
@@ -56,3 +66,7 @@ class Combinations:
 
     def _value(self, name: str, value: float) -> str:
         return f"{name} {self.view.labelled(name, value, plain(value, 6))}"
+
+
+def _has_few_whole_values(times: Counter[float]) -> bool:
+    return len(times) <= _MOST_VALUES and all(value.is_integer() for value in times)

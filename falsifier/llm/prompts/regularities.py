@@ -1,7 +1,7 @@
 """What signals were each time that a discrete signal changed, which tells of thresholds and conditions."""
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -12,8 +12,8 @@ from falsifier.llm.prompts.courses import Array, jumps
 from falsifier.llm.prompts.numbers import column_decimals, plain
 from falsifier.llm.prompts.view import View
 
-# Changes that are told, and the conditions of one.
-_MOST_TOLD, _MOST_CONDITIONS = 6, 4
+# Changes that are told, and the conditions of one; recorded signals and inputs that are looked at.
+_MOST_TOLD, _MOST_CONDITIONS, _MOST_RECORDED, _MOST_INPUTS = 6, 4, 24, 12
 # A condition is a range, or two, as narrow as this share of all values, in which a signal is for no more than
 # this share of the time, and in which some signal would be each time by chance with no more than this
 # probability.
@@ -25,9 +25,10 @@ _CHATTERS = 200
 # Times of a sample that are looked at for the values that signals have.
 _TIMES = 100
 
+_JUMPS = "jumps"  # what a signal that is not discrete does
 _HEAD = (
-    "So far, other signals just before each change of a discrete signal, or jump of another one, and inputs "
-    "at that time, were as follows; what samples with the same beginning share counts once:"
+    "So far, signals just before each change of a discrete signal, or jump of another one, and inputs at "
+    "that time, were as follows; what samples with the same beginning share counts once:"
 )
 
 
@@ -50,10 +51,10 @@ class Regularities:
             return
         then = np.stack([inside[name] for name in self._names])
         before = np.roll(then, 1, axis=1)
-        before[len(self.view.recorded) :] = then[len(self.view.recorded) :]
+        before[len(self._recorded) :] = then[len(self._recorded) :]
         self._known.append(then[:, :: max(1, len(inside) // _TIMES)])
         discrete = self.view.discrete(inside)
-        for name in self.view.recorded:
+        for name in self._recorded:
             column = inside[name]
             changes = np.flatnonzero(np.diff(column)) + 1 if name in discrete else jumps(column)
             if len(changes) > _CHATTERS:
@@ -61,43 +62,50 @@ class Regularities:
             for k in changes[:_CHATTERS].tolist():
                 is_up = bool(column[k] > column[k - 1])
                 ends = (self._value(name, v, 6) for v in column[k - 1 : k + 1].tolist())
-                change = " -> ".join(ends) if name in discrete else f"jumps {'up' if is_up else 'down'}"
+                change = " -> ".join(ends) if name in discrete else _JUMPS
                 self._seen[name][change, is_up].append(np.append(before[:, k], inside.times[k]))
 
     @property
     def text(self) -> str:
         """What was so each time, in a line for each change, those of the requirement's signals first."""
-        names = (n for n in self.view.recorded if n in self._seen and n not in self._chattering)
+        names = (n for n in self._recorded if n in self._seen and n not in self._chattering)
         lines = [line for name in names for line in self._of(name)]
-        lines.sort(key=lambda line: " jumps " in line)
+        lines.sort(key=lambda line: f" {_JUMPS} " in line)
         return "\n".join((_HEAD, *lines[:_MOST_TOLD])) if lines else ""
+
+    @cached_property
+    def _recorded(self) -> tuple[str, ...]:
+        return self.view.recorded[:_MOST_RECORDED]
 
     @cached_property
     def _names(self) -> tuple[str, ...]:
         """Signals that are told, then inputs."""
-        recorded = self.view.recorded
-        return (*recorded, *(r.name for r in self.view.space.inputs if r.name not in recorded))
+        inputs = [r.name for r in self.view.space.inputs if r.name not in self._recorded]
+        return (*self._recorded, *inputs[:_MOST_INPUTS])
 
     def _of(self, name: str) -> Iterator[str]:
         counts = len(self._seen[name]) >= _COUNTS
+        is_real = any(
+            change == _JUMPS for change, _ in self._seen[name]
+        )  # and looked discrete in some samples
         changes: defaultdict[str, list[Array]] = defaultdict(list)
         for (change, is_up), found in self._seen[name].items():
-            changes[("up" if is_up else "down") if counts else change] += found
+            way = f"{f'{_JUMPS} ' * is_real}{'up' if is_up else 'down'}"
+            changes[way if is_real or counts else change] += found
         for change, found in changes.items():
             # Samples with the same beginning have the same changes there, which are one.
             seen: Array = np.unique(np.array(found), axis=0)[:, :-1]
-            own = () if change.startswith("jumps") else (name,)
-            if so := self._common(seen.T, without=own):
+            if so := self._common(seen.T, without="" if is_real else name):
                 yield f"- {name} {change}, {len(seen)} times: {', '.join(so[:_MOST_CONDITIONS])}"
 
-    def _common(self, seen: Array, *, without: Collection[str]) -> list[str]:
+    def _common(self, seen: Array, *, without: str) -> list[str]:
         """Signals that were in a narrow range each time, and seldom are, the most telling ones first.
 
         ``seen`` has their values, shape (signals, times).
         """
         found = []
         for name, values, known in zip(self._names, seen, np.concatenate(self._known, axis=1), strict=True):
-            ranges = [] if name in without else _ranges(values, float(np.ptp(known)))
+            ranges = [] if name == without else _ranges(values, float(np.ptp(known)))
             share = float(sum(((known >= low) & (known <= high)).mean() for low, high in ranges))
             # The first time in each range says where it is.
             by_chance = len(self._names) * share ** (len(values) - len(ranges))

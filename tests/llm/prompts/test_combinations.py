@@ -34,3 +34,18 @@ def test_the_likeliest_combinations_that_never_came_about_are_told_first() -> No
     many = Combinations(replace(view, info=info, experiment=experiment))
     many.add(Trajectory(TIMES, {"x": TIMES // 1, "mode": LATE, "u": 0 * TIMES}))
     assert many.text == "", "a counter has too many values"
+
+
+def test_a_real_signal_that_looks_discrete_in_some_samples_only_is_not_mistaken() -> None:
+    info = ModelInfo("m", variables=(Variable("x", kind="boolean"), Variable("mode")))
+    view = View.of(lag_problem("G (x <= 0.9)"))
+    view = replace(view, info=info, experiment=replace(view.experiment, outputs=("x", "mode")))
+    together = Trajectory(TIMES, {"x": ON, "mode": 0 * TIMES, "u": TIMES})
+    moving = Trajectory(TIMES, {"x": ON, "mode": 1 - ON, "u": TIMES})
+    seen, real = Combinations(view), Combinations(view)
+    for each in (together, moving):
+        seen.add(each)
+    assert seen.text == "Never at one time so far: x 1 with mode 1."
+    for each in (moving, together, Trajectory(TIMES, {"x": ON, "mode": TIMES / 7, "u": TIMES})):
+        real.add(each)
+    assert real.text == ""

@@ -328,6 +328,17 @@ def test_ranges_in_which_the_same_was_not_tried_are_told_together() -> None:
     tried = Tried(replace(View.of(PROBLEM), space=space))
     tried.add(space.decode([0.0, 0.1, 0.0, 0.1, 0.0, 0.5]))
     assert tried.gaps == "u and v above 0.1 up to 1; w above 0.5 up to 1"
+    many = tuple(InputRange(f"u{k}", 0, k, control_points=2) for k in range(1, 6))
+    assert Tried(replace(View.of(PROBLEM), space=SearchSpace(many[1:], (), 10.0))).gaps.count("; ") == 3
+    assert Tried(replace(View.of(PROBLEM), space=SearchSpace(many, (), 10.0))).gaps == ""
+
+
+def test_no_range_is_told_of_a_signal_that_was_discrete_in_some_samples() -> None:
+    view, times = View.of(lag_problem("G[0,10] (x <= 0.9)")), np.linspace(0.0, 10.0, 101)
+    reached = Reached(view)
+    for column, extent in ((times / 20, "Ranges so far: x 0 to 0.5."), (times // 2, "")):
+        reached.news(SampleProgress.of(view, Trajectory(times, {"x": column})))
+        assert reached.extent == extent
 
 
 @pytest.mark.parametrize(

@@ -54,9 +54,9 @@ def test_two_thresholds_are_told_as_two() -> None:
 def test_all_steps_of_a_counter_are_one_change() -> None:
     _, only, _ = lines(2, np.floor(TIMES / 11.5), 0 * TIMES)
     assert only == "- n up, 16 times: x 1.991"
-    assert not any("mode" in line for line in lines(2, 0 * TIMES, np.mod(TIMES * 10 // 1, 2.0))), (
-        "it chatters"
-    )
+    chatter = np.mod(TIMES * 10 // 1, 2.0)
+    (_, only) = lines(2, chatter, chatter)
+    assert only.startswith("- x jumps down"), "nothing is told of what chatters"
 
 
 def test_what_was_so_in_samples_with_the_same_beginning_was_so_once() -> None:
@@ -70,3 +70,13 @@ def test_what_was_so_in_samples_with_the_same_beginning_was_so_once() -> None:
     assert seen.text == ""
     seen.add(Trajectory(times, {"x": np.where(times > 7, 1.0, 0.0), "u": times - 2}))
     assert seen.text.endswith("- x 0 -> 1, 2 times: u 5.1")
+
+
+def test_a_real_signal_that_is_discrete_in_some_samples_only_jumps_in_all() -> None:
+    seen = Regularities(View.of(lag_problem("G (x <= 0.9)")))
+    times = np.linspace(0.0, 10.0, 101)
+    for end in (1.0, 1.0, 1.5, 1.5):
+        start = 4.0 + len(seen._known)
+        seen.add(Trajectory(times, {"x": np.where(times > start, end, 0.0), "u": times - start}))
+    assert "signals just before each change" in seen.text
+    assert [*seen.text.splitlines()[1:]] == ["- x jumps up, 4 times: u 0.1"]
