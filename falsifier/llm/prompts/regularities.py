@@ -85,9 +85,8 @@ class Regularities:
 
     def _of(self, name: str) -> Iterator[str]:
         counts = len(self._seen[name]) >= _COUNTS
-        is_real = any(
-            change == _JUMPS for change, _ in self._seen[name]
-        )  # and looked discrete in some samples
+        # It may have looked discrete in other samples.
+        is_real = any(change == _JUMPS for change, _ in self._seen[name])
         changes: defaultdict[str, list[Array]] = defaultdict(list)
         for (change, is_up), found in self._seen[name].items():
             way = f"{f'{_JUMPS} ' * is_real}{'up' if is_up else 'down'}"
