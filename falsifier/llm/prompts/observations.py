@@ -19,7 +19,7 @@ from falsifier.llm.prompts.together import Side, asked_for, closest, longest_fai
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Verdict
 from falsifier.stl.diagnosis import links
-from falsifier.stl.expression import Call, Expression
+from falsifier.stl.expression import Arithmetic, Call, Expression, Name, Number
 from falsifier.stl.formula import And, Iff, Implies, Or
 from falsifier.stl.margins import shown, signed
 
@@ -285,9 +285,14 @@ def _shown_columns(view: View, trajectory: Trajectory) -> dict[str, Array]:
 
 
 def _is_folded(side: Expression, told: Collection[str]) -> bool:
-    """Whether a term is the absolute value of a signal, or of what is added to it, that is told itself."""
-    is_of_one = isinstance(side, Call) and side.function == "abs" and len(side.signals) == 1
-    return is_of_one and side.signals[0] in told
+    """Whether a term is the absolute value of a signal, or of it and a number, that is told itself."""
+    if not (isinstance(side, Call) and side.function == "abs" and len(side.signals) == 1):
+        return False
+    (inner,) = side.operands
+    parts: tuple[Expression, ...] = (inner,)
+    if isinstance(inner, Arithmetic) and inner.operator in ("+", "-"):
+        parts = inner.left, inner.right
+    return all(isinstance(part, Name | Number) for part in parts) and side.signals[0] in told
 
 
 def told_accuracy(view: View, name: str, column: Array) -> float:

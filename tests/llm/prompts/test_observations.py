@@ -194,8 +194,12 @@ def test_a_part_that_has_no_value_where_it_does_not_matter_is_told_where_it_does
         assert any("sqrt(x + 0.2) <= 9, from 0 to 0.5 s" in line for line in observed(view, evaluation).full)
 
 
-def test_in_short_the_course_of_a_signal_is_told_and_not_of_its_absolute_value() -> None:
-    swings = observed(*seen("G[0,10] (abs(x) <= 2)", np.sin(TIMES)))
+@pytest.mark.parametrize(
+    ("term", "is_told"), [("abs(x)", False), ("abs(x - 0.5)", False), ("abs(x*x - 0.5)", True)]
+)
+def test_of_an_absolute_value_the_course_of_the_signal_is_told(term: str, *, is_told: bool) -> None:
+    swings = observed(*seen(f"G[0,10] ({term} <= 2)", np.sin(TIMES)))
     for lines in (swings.full, swings.short):
-        assert not any(each.startswith("abs(x): ") for each in lines)
-        assert any(each.startswith("x: ") for each in lines)
+        assert any(each.startswith("abs(") and ": 0:" in each for each in lines) == is_told
+    assert any(each.startswith("x: ") for each in swings.full)
+    assert any(each.startswith("x: ") for each in swings.short) != is_told
