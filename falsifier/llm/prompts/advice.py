@@ -11,19 +11,20 @@ _FIRST_OF = {
         "go once through all values, each held for long enough, which shows what the system does with them"
     ),
     "inputs": (
-        "good first samples are the limits of the ranges, and steps between these, of each input at times of "
-        "its own, or a slow run through a whole range, which show how and where the system reacts"
+        "good first samples are the limits of the ranges, steps between these, of each input at times of its "
+        "own, or a slow run through a whole range: they show how and where the system reacts"
     ),
 }
 _ON_TIME = (
     "Look at the times that decided the robustness values, and change the {what} so that the signals at such "
     "a time move towards violating the requirement."
 )
-_STUCK = "The last two samples were no better"
-_SUCH = (
-    "unless the best ones are close to a violation, try something else, such as a short pulse, a small "
-    "amplitude, a slow change, a faster repetition, or values just inside the limits"
+_STUCK = "The last two samples were no better."
+_ELSE = (
+    "Try something else{unless}: a short pulse, a small amplitude, a slow change, a faster repetition, or "
+    "values just inside the limits."
 )
+_CLOSE = ", unless the best ones are close to a violation"
 
 
 def on_first(space: SearchSpace, *, is_named: bool) -> str:
@@ -43,11 +44,10 @@ def on_next(space: SearchSpace, *, is_timed: bool, is_flat: bool, is_stuck: bool
     """
     if is_timed:
         yield _ON_TIME.format(what="inputs" if space.inputs else "parameters")
-    such = "" if _only_jumps(space) else _SUCH
     if is_stuck and not is_flat:
-        yield f"{_STUCK}{': ' * bool(such)}{such}."
-    elif is_flat and such:
-        yield f"{such[0].upper()}{such[1:]}."
+        yield _STUCK
+    if (is_stuck or is_flat) and not _only_jumps(space):
+        yield _ELSE.format(unless="" if is_flat else _CLOSE)
 
 
 def _only_jumps(space: SearchSpace) -> bool:

@@ -8,7 +8,7 @@ from itertools import combinations, product
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.llm.prompts.numbers import plain
+from falsifier.llm.prompts.numbers import value_text
 from falsifier.llm.prompts.view import View
 
 # Values of a signal that is looked at, signals, and combinations that are told.
@@ -62,10 +62,8 @@ class Combinations:
             for a, b in product(few[one], few[two]):
                 if (a, b) not in seen:
                     expected = few[one][a] * few[two][b] / few[two].total()
-                    yield expected, f"{self._value(one, a)} with {self._value(two, b)}"
-
-    def _value(self, name: str, value: float) -> str:
-        return f"{name} {self.view.labelled(name, value, plain(value, 6))}"
+                    pair = (f"{n} {value_text(self.view, n, v)}" for n, v in ((one, a), (two, b)))
+                    yield expected, " with ".join(pair)
 
 
 def _has_few_whole_values(times: Counter[float]) -> bool:

@@ -88,6 +88,11 @@ def plain(value: float, decimals: int) -> str:
     return text if abs(rounded) >= _TINY else number(rounded, _ROUNDED_DIGITS) if rounded else "0"
 
 
+def value_text(view: View, name: str, value: float, decimals: int = 6) -> str:
+    """A value of a signal, with the name of its item if it has one."""
+    return view.labelled(name, value, plain(value, decimals))
+
+
 def bounds(low: float, high: float, digits: int = _BOUND_DIGITS) -> tuple[str, str]:
     """Bounds as text; rounded inward if rounded at all, so that a printed bound lies in the range.
 
@@ -140,9 +145,10 @@ def as_signals(view: View, candidate: Candidate, *, in_brief: bool = False) -> t
         alike.setdefault(told, []).append(r.name)
     lines = [f"{', '.join(names)}: {told}" for told, names in alike.items()]
     for p in view.space.parameters:
-        value, decimals = candidate.parameters[p.name], decimals_for(p.high - p.low, _DIGITS_OF_PARAMETER)
-        is_short = p.scale != "log" and _told(value, decimals) == value
-        lines.append(f"{p.name} = {chosen(p, value, _DIGITS_OF_PARAMETER + _MORE_DECIMALS * is_short)}")
+        value = candidate.parameters[p.name]
+        if p.scale != "log":
+            value = _told(value, decimals_for(p.high - p.low, _DIGITS_OF_PARAMETER))
+        lines.append(f"{p.name} = {chosen(p, value, _DIGITS_OF_PARAMETER + _MORE_DECIMALS)}")
     return tuple(lines)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from falsifier.core.trajectory import Trajectory
 from falsifier.core.words import resolving
 from falsifier.llm.prompts.courses import jumps
-from falsifier.llm.prompts.numbers import column_decimals, fine_clock, number, plain
+from falsifier.llm.prompts.numbers import column_decimals, fine_clock, number, plain, value_text
 from falsifier.llm.prompts.view import View
 
 # A value or a change of a discrete signal: its name, the value before, the value.
@@ -25,7 +25,7 @@ _MOST_NEW, _MOST_OF_ONE, _MOST_SWITCHES = 8, 3, 8
 # New changes of a signal of the requirement up to which it is a mode, and no counter; changes of others up to
 # which all of them are told again.
 _MOST_OF_MODE = 6
-# Outputs and inputs that are told at each new change; of more inputs those that jump there.
+# Outputs and inputs that are told at each new change, of more inputs those that jump there; ranges told.
 _MOST_BESIDE = 6
 
 
@@ -109,23 +109,27 @@ class Reached:
         told = sorted(sorted(times, key=urgency)[:_MOST_SWITCHES])
         inputs = [r.name for r in self._view.space.inputs if r.name in trajectory.columns]
         outputs, texts = list(progress.ranges)[:_MOST_BESIDE], list[str]()
+        jumping = {n: set(jumps(trajectory[n]).tolist()) for n in (*outputs, *inputs)} if told else {}
         for k in told:
-            beside = [n for n in inputs if len(inputs) <= _MOST_BESIDE or k in jumps(trajectory[n])]
-            texts.append(self._change(progress, trajectory, [*outputs, *beside[:_MOST_BESIDE]], k))
+            driven = [n for n in inputs if len(inputs) <= _MOST_BESIDE or k in jumping[n]][:_MOST_BESIDE]
+            beside = {n: k in jumping[n] for n in (*outputs, *driven)}
+            texts.append(self._change(progress, trajectory, beside, k))
         known = {c for k in told for c in progress.changes.get(k, ())}
         is_all = known.issuperset(new) and progress.again <= set(told)
         return "; ".join((*texts, *([] if is_all else ["..."])))
 
-    def _change(self, progress: SampleProgress, trajectory: Trajectory, names: Sequence[str], k: int) -> str:
+    def _change(
+        self, progress: SampleProgress, trajectory: Trajectory, beside: Mapping[str, bool], k: int
+    ) -> str:
+        """All changes at an index, and signals beside them, with the value before if they jump there."""
         columns = trajectory.columns
         discrete = {name for name, _, _ in progress.stages}
 
-        def beside(name: str) -> str:
+        def told(name: str, *, jumps: bool) -> str:
             column = columns[name]
-            values = column[k - 1 : k + 1] if k in jumps(column) else column[k : k + 1]
-            decimals = column_decimals(column)
-            told = (self._view.labelled(name, v, plain(v, decimals)) for v in values.tolist())
-            return f"{name} {' -> '.join(told)}"
+            values = column[k - 1 : k + 1] if jumps else column[k : k + 1]
+            ends = (value_text(self._view, name, v, column_decimals(column)) for v in values.tolist())
+            return f"{name} {' -> '.join(ends)}"
 
         together = (
             self._stage((n, float(columns[n][k - 1]), float(columns[n][k])))
@@ -133,7 +137,8 @@ class Reached:
             if n in discrete and columns[n][k - 1] != columns[n][k]
         )
         words = f"{', '.join(together)} at {plain(trajectory.times[k], fine_clock(self._view))} s"
-        return f"{words} ({', '.join(map(beside, names))})" if names else words
+        others = ", ".join(told(name, jumps=jumps_there) for name, jumps_there in beside.items())
+        return f"{words} ({others})" if others else words
 
     @property
     def extent(self) -> str:
@@ -175,11 +180,8 @@ class Reached:
 
     def _stage(self, stage: Stage) -> str:
         name, before, value = stage
-        text = self._value(name, value)
-        return f"{name} {text}" if before is None else f"{name} {self._value(name, before)} -> {text}"
-
-    def _value(self, name: str, value: float) -> str:
-        return self._view.labelled(name, value, plain(value, 6))
+        ends = (value_text(self._view, name, v) for v in (before, value) if v is not None)
+        return f"{name} {' -> '.join(ends)}"
 
     def _passed(self, stage: Stage) -> bool:
         """Whether a signal that was not discrete in an earlier sample had this value there."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.llm.prompts.courses import Array, jumps
-from falsifier.llm.prompts.numbers import column_decimals, plain
+from falsifier.llm.prompts.numbers import column_decimals, value_text
 from falsifier.llm.prompts.view import View
 
 # Changes that are told, and the conditions of one; recorded signals and inputs that are looked at.
@@ -61,7 +61,7 @@ class Regularities:
                 self._chattering.add(name)
             for k in changes[:_CHATTERS].tolist():
                 is_up = bool(column[k] > column[k - 1])
-                ends = (self._value(name, v, 6) for v in column[k - 1 : k + 1].tolist())
+                ends = (value_text(self.view, name, v) for v in column[k - 1 : k + 1].tolist())
                 change = " -> ".join(ends) if name in discrete else _JUMPS
                 self._seen[name][change, is_up].append(np.append(before[:, k], inside.times[k]))
 
@@ -109,13 +109,10 @@ class Regularities:
             # The first time in each range says where it is.
             by_chance = len(self._names) * share ** (len(values) - len(ranges))
             if ranges and share <= _SELDOM and by_chance <= _CHANCE:
-                decimals = column_decimals(known)
-                ends = (dict.fromkeys(self._value(name, end, decimals) for end in one) for one in ranges)
+                digits = column_decimals(known)
+                ends = (dict.fromkeys(value_text(self.view, name, v, digits) for v in one) for one in ranges)
                 found.append((share, f"{name} {' or '.join(map(' to '.join, ends))}"))
         return [text for _, text in sorted(found)]
-
-    def _value(self, name: str, value: float, decimals: int) -> str:
-        return self.view.labelled(name, value, plain(value, decimals))
 
 
 def _ranges(values: Array, span: float) -> list[tuple[float, float]]:

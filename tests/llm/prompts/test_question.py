@@ -32,6 +32,14 @@ def sampled(problem: Problem, *points: Sequence[float]) -> list[Evaluation]:
     return [evaluate(problem, problem.space.decode(point)) for point in points]
 
 
+def switch_and_counter() -> View:
+    """A view of a Boolean x and an integer n."""
+    view = View.of(lag_problem("G[0,10] (x <= 0.9)"))
+    kinds = (Variable("x", kind="boolean"), Variable("n", kind="integer"))
+    experiment = replace(view.experiment, outputs=("x", "n"))
+    return replace(view, info=ModelInfo("m", variables=kinds), experiment=experiment)
+
+
 def asked_each(problem: Problem, evaluations: Sequence[Evaluation]) -> list[Message]:
     """The changing part of the question after each sample."""
     questions = Questions(View.of(problem), VARIANTS["MP5"])
@@ -153,6 +161,7 @@ def test_on_a_plateau_it_is_told_what_nothing_moved_and_what_was_not_tried() -> 
     still, brisk = [0.0] * 7 + [325.0] * 3, [100.0] * 7 + [0.0] * 3
     _, changing = told(problem, "MP5", sampled(problem, still, brisk, [0.0] * 7 + [300.0] * 3))
     assert "flat: it was +0.5 in all 3 samples" in changing and "Look at the time" not in changing
+    assert "Try something else: a short pulse" in changing, "none is the best"
     assert "the first to reach: gear 2; gear 3; gear 4; speed up to " in changing
     assert (
         "Not tried so far: throttle between 0 and 100; brake between 0 and 300. See" in changing
@@ -266,10 +275,7 @@ def test_of_many_inputs_those_that_jump_at_a_change_are_told() -> None:
 
 
 def test_the_first_changes_of_a_counter_are_the_first_in_time() -> None:
-    view = View.of(lag_problem("G[0,10] (x <= 0.9)"))
-    kinds = (Variable("x", kind="boolean"), Variable("n", kind="integer"))
-    view = replace(view, info=ModelInfo("m", variables=kinds))
-    view = replace(view, experiment=replace(view.experiment, outputs=("x", "n")))
+    view = switch_and_counter()
     times = np.linspace(0.0, 10.0, 101)
     trajectory = Trajectory(times, {"x": np.where(times >= 9, 1.0, 0.0), "n": times // 1})
     told = Reached(view).switches(SampleProgress.of(view, trajectory), trajectory)
@@ -355,19 +361,13 @@ def test_the_times_that_decided_are_pointed_out_unless_several_things_are_needed
 def test_how_to_go_on_follows_from_whether_the_last_two_samples_were_better() -> None:
     falling = [[0.1] * 5, [0.3] * 5, [0.5] * 5]
     better, worse = (asked_each(PROBLEM, sampled(PROBLEM, *each))[-1] for each in (falling, falling[::-1]))
-    for text in (
-        "The last two samples were no better: unless the best ones are",
-        "Not tried so far",
-        "Ranges",
-    ):
+    stuck = "The last two samples were no better.\n\nTry something else, unless the best ones are close"
+    for text in (stuck, "Not tried so far", "Ranges"):
         assert text in worse.content and text not in better.content
 
 
 def test_all_changes_of_a_moment_are_told_if_one_of_them_is_new() -> None:
-    view = View.of(lag_problem("G[0,10] (x <= 0.9)"))
-    kinds = (Variable("x", kind="boolean"), Variable("n", kind="integer"))
-    view = replace(view, info=ModelInfo("m", variables=kinds))
-    view = replace(view, experiment=replace(view.experiment, outputs=("x", "n")))
+    view = switch_and_counter()
     times = np.linspace(0.0, 10.0, 11)
     reached, told = Reached(view), list[str]()
     switched = np.where(times >= 4, 1.0, 0.0)
