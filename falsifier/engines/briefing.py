@@ -36,7 +36,7 @@ class Briefing:
         simulations: maximum number of simulations of the run, which prompts state; None: no limit.
         lessons: what the LLM wrote down for its next question.
         numbers: numbers of the samples, by the keys of their candidates.
-        told: number of samples.
+        samples: candidates of the samples, in order.
         best: candidate of the sample with the smallest robustness.
         pending: candidates that were proposed and have no evaluation yet.
         rationales: the LLM's reasons, by the keys of its candidates.
@@ -60,7 +60,7 @@ class Briefing:
         self.best: Candidate | None = None
         self.pending: list[Candidate] = []
         self.rationales: dict[Hashable, str] = {}
-        self.told = 0
+        self.samples: list[Candidate] = []
 
     @property
     def view(self) -> View:
@@ -101,7 +101,8 @@ class Briefing:
         """Return the form of replies with up to ``count`` candidates."""
         space, has = self.view.space, self.variant.has
         offered = space if has("freedom") else space.fixed
-        return ReplyForm(offered, named=has("names"), count=count, lessons=has("lessons"))
+        samples = self.samples if self.view.is_long_to_repeat and not self.variant.is_published else None
+        return ReplyForm(offered, has("names"), count, has("lessons"), samples)
 
     def doubt(self, confirmation: Confirmation) -> None:
         """Note that a violation does not count, before its evaluation is told; prompts state the reason."""
@@ -113,8 +114,8 @@ class Briefing:
             if self._disguise:
                 evaluation = self._disguise.hidden(evaluation)
             key = evaluation.candidate.key
-            self.told += 1
-            self.numbers[key] = self.told
+            self.samples.append(evaluation.candidate)
+            self.numbers[key] = len(self.samples)
             if evaluation.robustness is not None and evaluation.robustness < self._smallest:
                 self._smallest, self.best = evaluation.robustness, evaluation.candidate
             self._questions.tell(

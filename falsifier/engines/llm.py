@@ -156,7 +156,7 @@ class LLMEngine:
     def _instead(self, error: NoValidReplyError) -> Candidate:
         """Return what is simulated in place of an answer."""
         briefing = self.briefing
-        seed = (self._sample, briefing.told, len(briefing.pending))
+        seed = (self._sample, len(briefing.samples), len(briefing.pending))
         changed = random_change(briefing.view.space, briefing.best, seed=seed)
         what = "a random change of the best sample" if briefing.best else "a random sample"
         rationale = f"{what}, because {self._chat.llm} gave no valid reply"

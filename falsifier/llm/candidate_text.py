@@ -41,7 +41,7 @@ _MOST_CANDIDATES = 1000
 _SHOWN_BEFORE, _SHOWN_KEYS = 24, 10
 # Keys of a candidate, and of what stands beside it and in its parts.
 _PARTS = frozenset({"signals", "parameters", "point"})
-_KEYS = _PARTS | {"candidates", "lessons", "rationale"}
+_KEYS = _PARTS | {"candidates", "lessons", "rationale", "as_in"}
 _KEYS |= {"name", "value", "values", "points", "times", "interpolation"}
 
 # In a point: which of its places are Boolean is known once it is read.
@@ -150,6 +150,7 @@ class WrittenCandidate(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False, defer_build=True)
 
     rationale: Annotated[str, BeforeValidator(lambda found: found or ""), AfterValidator(_storable)] = ""
+    as_in: Annotated[int, BeforeValidator(lambda found: found or 0)] = 0
     signals: Annotated[list[WrittenSignal], FailFast(), BeforeValidator(_entries)] = Field(
         default_factory=list
     )

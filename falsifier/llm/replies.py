@@ -46,6 +46,8 @@ class ReplyForm:
     named: bool = True
     count: int = 1  # number of candidates
     lessons: bool = False  # whether the LLM may write down what it is to be told again
+    # Samples by number, from 1, to which a candidate may refer for what it leaves out; None: to none.
+    samples: Sequence[Candidate] | None = None
 
     def schema(self) -> dict[str, Any]:
         """JSON Schema within the subset of strict servers: all keys required, no others allowed, no maps.
@@ -55,6 +57,8 @@ class ReplyForm:
         stated as far as all inputs share them, and left out where a server does not take them.
         """
         candidate: dict[str, Any] = {"rationale": _TEXT}
+        if self.samples is not None:
+            candidate["as_in"] = {"type": "integer", "minimum": 0}
         if self.named:
             candidate |= self._named_parts()
         else:
@@ -68,6 +72,7 @@ class ReplyForm:
     def _named_parts(self) -> dict[str, Any]:
         parts: dict[str, Any] = {}
         inputs, parameters = self.space.inputs, self.space.parameters
+        least = None if self.samples is not None else 1
         if inputs:
             signal: dict[str, Any] = {"name": {"type": "string", "enum": [r.name for r in inputs]}}
             value = {"type": "number", **_range(inputs)}
@@ -78,11 +83,11 @@ class ReplyForm:
             else:
                 counts = [r.control_points for r in inputs]
                 signal["values"] = schema_of_list(value, min(counts), max(counts))
-            parts["signals"] = schema_of_list(schema_of_object(**signal), len(inputs), len(inputs))
+            parts["signals"] = schema_of_list(schema_of_object(**signal), least and len(inputs), len(inputs))
         if parameters:
             name = {"type": "string", "enum": [p.name for p in parameters]}
             parameter = schema_of_object(name=name, value={"type": "number", **_range(parameters)})
-            parts["parameters"] = schema_of_list(parameter, len(parameters), len(parameters))
+            parts["parameters"] = schema_of_list(parameter, least and len(parameters), len(parameters))
         return parts
 
     def read(self, text: str, *, origin: str = "") -> list[Candidate]:
@@ -115,6 +120,7 @@ class ReplyForm:
                 if p.name in parameters:
                     raise RejectedReplyError(f"parameter {quoted(p.name)} is given twice")
                 parameters[p.name] = _possible(p.value, ranges[p.name]) if p.name in ranges else p.value
+        signals, parameters = self._completed(written.as_in, signals, parameters)
         candidate = Candidate(signals, parameters, origin, written.rationale)
         if defects:
             defects += self.space.outside(candidate)
@@ -123,6 +129,19 @@ class ReplyForm:
             return self.space.admit(candidate)
         except CandidateError as error:
             raise RejectedReplyError(str(error)) from None
+
+    def _completed(
+        self, number: int, signals: dict[str, Signal], parameters: dict[str, float]
+    ) -> tuple[dict[str, Signal], dict[str, float]]:
+        """Return signals and parameters with those of a sample where they are left out; 0: of none."""
+        if not number or self.samples is None:
+            return signals, parameters
+        if not 0 < number <= len(self.samples):
+            raise RejectedReplyError(
+                f'"as_in": there is no sample {number}; the latest is {len(self.samples)}'
+            )
+        sample = self.samples[number - 1]
+        return {**sample.signals, **signals}, {**sample.parameters, **parameters}
 
     def _signal(self, written: WrittenSignal) -> Signal:
         ranges = {r.name: r for r in self.space.inputs}

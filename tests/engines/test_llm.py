@@ -32,6 +32,20 @@ def reply(values: Sequence[float], rationale: str = "because") -> str:
     return json.dumps({"rationale": rationale, "signals": [{"name": "u", "values": list(values)}]})
 
 
+@pytest.mark.parametrize("anonymous", [False, True])
+def test_what_a_reply_leaves_out_is_as_in_the_sample_that_it_names(*, anonymous: bool) -> None:
+    problem = lag_problem(inputs=3, points=1, parameters=[START])
+    names = ["u1", "u2", "u3", "p1"] if anonymous else list(problem.space.names)
+    signals = [{"name": name, "values": [0.1 * k]} for k, name in enumerate(names[:3], start=1)]
+    first = {"as_in": 0, "signals": signals, "parameters": [{"name": names[3], "value": 0.4}]}
+    second = {"as_in": 1, "signals": [{"name": names[1], "values": [1.0]}]}
+    engine = LLMEngine(problem, ScriptedChat(map(json.dumps, (first, second))), anonymous=anonymous)
+    engine.tell([evaluate(problem, *engine.ask())])
+    (candidate,) = engine.ask()
+    assert [s.values[0] for s in candidate.signals.values()] == pytest.approx([0.1, 1.0, 0.3])
+    assert list(candidate.parameters.values()) == [0.4]
+
+
 def test_the_road_to_a_valid_reply(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rate limit, lost connection, bad JSON, a point out of range, a repetition, then success."""
     monkeypatch.setattr("falsifier.llm.client._FIRST_DELAY", 0.01)

@@ -83,6 +83,9 @@ _JSON = "Reply with one JSON object{many} in this form, with one or two sentence
 _RATIONALE = "why these values"
 _LESSONS = "what the samples taught so far"
 _ALL_NOTE = "Every {} must be given in every reply, also those that stay as they were."
+_AS_IN_NOTE = (
+    'Each {} that is left out is as in the sample whose number "as_in" gives; if "as_in" is 0, none may be.'
+)
 _FREE_NOTE = (
     'If "times" is empty, the values are evenly spaced from 0 to the stop time, however many there are, as '
     "pieces of equal length if interpolation is constant; one value alone is a constant. Otherwise "
@@ -320,9 +323,8 @@ def _reply(view: View, count: int) -> Iterator[str]:
     space = view.space
     yield reply_form(view, count, named=True, own=True)
     if len(space.names) > 1:
-        yield _ALL_NOTE.format(
-            " and ".join(["input"] * bool(space.inputs) + ["parameter"] * bool(space.parameters))
-        )
+        all_of = " and ".join(["input"] * bool(space.inputs) + ["parameter"] * bool(space.parameters))
+        yield (_AS_IN_NOTE if view.is_long_to_repeat else _ALL_NOTE).format(all_of)
     if any(r.free for r in space.inputs):
         fixed = [r.name for r in space.inputs if not r.free]
         yield _FREE_NOTE + (_FIXED_NOTE.format(listed(fixed)) if fixed else "")
@@ -336,6 +338,7 @@ def reply_form(view: View, count: int, *, named: bool, own: bool) -> str:
     control points of its own where these are free.
     """
     space, parts = view.space, [f'"rationale": "{_RATIONALE}"']
+    parts += ['"as_in": number'] * (own and view.is_long_to_repeat)
     is_free = own and any(r.free for r in space.inputs)
     signals, parameters = [], [f'{{"name": {json.dumps(p.name)}, "value": number}}' for p in space.parameters]
     for r in space.inputs:

@@ -27,6 +27,8 @@ from falsifier.stl.formula import Temporal
 # What the lines on signals that nobody asked for may have in bytes, and what each has besides its name and
 # its description: fewer than 200 of them are told, so that a prompt fits whatever the FMU has.
 _MOST_OF_OTHERS, _BYTES_OF_LINE = 40_000, 200
+# Inputs and parameters that every reply gives; of more, those that change.
+_MOST_REPEATED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +70,11 @@ class View:
     def chosen(self) -> str:
         """What is chosen, in one word."""
         return "inputs" if self.space.inputs else "parameters"
+
+    @property
+    def is_long_to_repeat(self) -> bool:
+        """Whether so much is chosen that a reply may name a sample for what stays as it was there."""
+        return len(self.space.names) > _MOST_REPEATED
 
     @property
     def looked_at(self) -> float:

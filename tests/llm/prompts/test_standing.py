@@ -184,7 +184,7 @@ def test_a_question_fits_however_many_outputs_there_are(description: str) -> Non
 class TestReply:
     """The form that is asked for."""
 
-    problem = lag_problem(free=FREE, parameters=[START])
+    problem = lag_problem(inputs=3, free=FREE, parameters=[START])
 
     def form(self, variant: str, **more: Any) -> str:
         return next(x for x in standing(self.problem, variant, **more).splitlines() if x.startswith("{"))
@@ -193,12 +193,24 @@ class TestReply:
     def test_with_numbers_in_its_blanks_it_can_be_read(self, variant: str, *, free: bool) -> None:
         for count in (1, 3):
             space = self.problem.space if free else self.problem.space.fixed
-            form = ReplyForm(space, named=variant != "MP1", count=count, lessons=free)
-            told = self.form(variant, count=count).replace("5 numbers", "0, 0, 0, 0, 0")
-            filled = re.sub(r"\[(\d )?numbers\]", "[0]", told).replace(": number", ": 0")
+            form = ReplyForm(
+                space, named=variant != "MP1", count=count, lessons=free, samples=[] if free else None
+            )
+            told = re.sub(
+                r"(\d+) numbers", lambda m: ", ".join("0" * int(m[1])), self.form(variant, count=count)
+            )
+            filled = told.replace("[numbers]", "[0]").replace(": number", ": 0")
             (found,) = form.read(filled)
             assert isinstance(found, Candidate) and set(found.signals["u"].values) == {0.0}
             assert list(json.loads(filled)) == list(form.schema()["properties"]), "in the same order"
+
+    def test_many_inputs_need_not_be_repeated(self) -> None:
+        few, many = (standing(lag_problem(inputs=3, parameters=p)) for p in ([], [START]))
+        assert "must be given in every reply" in few and "as_in" not in few
+        assert (
+            '"as_in": number, "signals"' in many
+            and "Each input and parameter that is left out is as in the sample" in many
+        )
 
 
 class TestAdvice:
