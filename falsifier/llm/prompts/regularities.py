@@ -4,6 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
@@ -38,9 +39,10 @@ class Regularities:
 
     view: View
     _known: list[Array] = field(default_factory=list)  # values of a sample, shape (signals, times)
-    # By signal and its change, in words and whether it leads up, the values of all signals, then the time.
-    _seen: defaultdict[str, defaultdict[tuple[str, bool], list[Array]]] = field(
-        default_factory=lambda: defaultdict(lambda: defaultdict(list))
+    # By signal and its change, in words and whether it leads up, the values of all signals, then the time, as
+    # bytes: samples with the same beginning have the same changes there, which are one.
+    _seen: defaultdict[str, defaultdict[tuple[str, bool], dict[bytes, None]]] = field(
+        default_factory=lambda: defaultdict(lambda: defaultdict(dict))
     )
     _chattering: set[str] = field(default_factory=set)
 
@@ -53,23 +55,27 @@ class Regularities:
         before = np.roll(then, 1, axis=1)
         before[len(self._recorded) :] = then[len(self._recorded) :]
         self._known.append(then[:, :: max(1, len(inside) // _TIMES)])
+        rows = np.vstack((before, inside.times)).T + 0.0  # there are two zeros, with other bytes
         discrete = self.view.discrete(inside)
         for name in self._recorded:
             column = inside[name]
             changes = np.flatnonzero(np.diff(column)) + 1 if name in discrete else jumps(column)
             if len(changes) > _CHATTERS:
                 self._chattering.add(name)
-            for k in changes[:_CHATTERS].tolist():
-                is_up = bool(column[k] > column[k - 1])
-                ends = (value_text(self.view, name, v) for v in column[k - 1 : k + 1].tolist())
-                change = " -> ".join(ends) if name in discrete else _JUMPS
-                self._seen[name][change, is_up].append(np.append(before[:, k], inside.times[k]))
+            if name in self._chattering:
+                continue
+            pairs = list(zip(column[changes - 1].tolist(), column[changes].tolist(), strict=True))
+            ends = {v: value_text(self.view, name, v) for v in {*chain(*pairs)} if name in discrete}
+            for (old, new), row in zip(pairs, rows[changes], strict=True):
+                change = f"{ends[old]} -> {ends[new]}" if ends else _JUMPS
+                self._seen[name][change, new > old][row.tobytes()] = None
 
     @property
     def text(self) -> str:
         """What was so each time, in a line for each change, those of the requirement's signals first."""
         names = (n for n in self._recorded if n in self._seen and n not in self._chattering)
-        lines = [line for name in names for line in self._of(name)]
+        known = np.concatenate(self._known, axis=1) if self._known else np.empty(0)
+        lines = [line for name in names for line in self._of(name, known)]
         lines.sort(key=lambda line: f" {_JUMPS} " in line)
         return "\n".join((_HEAD, *lines[:_MOST_TOLD])) if lines else ""
 
@@ -83,33 +89,32 @@ class Regularities:
         inputs = [r.name for r in self.view.space.inputs if r.name not in self._recorded]
         return (*self._recorded, *inputs[:_MOST_INPUTS])
 
-    def _of(self, name: str) -> Iterator[str]:
+    def _of(self, name: str, known: Array) -> Iterator[str]:
         counts = len(self._seen[name]) >= _COUNTS
         # It may have looked discrete in other samples.
         is_real = any(change == _JUMPS for change, _ in self._seen[name])
-        changes: defaultdict[str, list[Array]] = defaultdict(list)
+        changes: defaultdict[str, dict[bytes, None]] = defaultdict(dict)
         for (change, is_up), found in self._seen[name].items():
             way = f"{f'{_JUMPS} ' * is_real}{'up' if is_up else 'down'}"
-            changes[way if is_real or counts else change] += found
+            changes[way if is_real or counts else change] |= found
         for change, found in changes.items():
-            # Samples with the same beginning have the same changes there, which are one.
-            seen: Array = np.unique(np.array(found), axis=0)[:, :-1]
-            if so := self._common(seen.T, without="" if is_real else name):
+            seen = np.frombuffer(b"".join(found)).reshape(len(found), -1)[:, :-1]
+            if so := self._common(seen.T, known, without="" if is_real else name):
                 yield f"- {name} {change}, {len(seen)} times: {', '.join(so[:_MOST_CONDITIONS])}"
 
-    def _common(self, seen: Array, *, without: str) -> list[str]:
+    def _common(self, seen: Array, known: Array, *, without: str) -> list[str]:
         """Signals that were in a narrow range each time, and seldom are, the most telling ones first.
 
-        ``seen`` has their values, shape (signals, times).
+        ``seen`` has their values then, ``known`` those at all times, shape (signals, times) each.
         """
         found = []
-        for name, values, known in zip(self._names, seen, np.concatenate(self._known, axis=1), strict=True):
-            ranges = [] if name == without else _ranges(values, float(np.ptp(known)))
-            share = float(sum(((known >= low) & (known <= high)).mean() for low, high in ranges))
+        for name, values, usual in zip(self._names, seen, known, strict=True):
+            ranges = [] if name == without else _ranges(values, float(np.ptp(usual)))
+            share = float(sum(((usual >= low) & (usual <= high)).mean() for low, high in ranges))
             # The first time in each range says where it is.
             by_chance = len(self._names) * share ** (len(values) - len(ranges))
             if ranges and share <= _SELDOM and by_chance <= _CHANCE:
-                digits = column_decimals(known)
+                digits = column_decimals(usual)
                 ends = (dict.fromkeys(value_text(self.view, name, v, digits) for v in one) for one in ranges)
                 found.append((share, f"{name} {' or '.join(map(' to '.join, ends))}"))
         return [text for _, text in sorted(found)]
