@@ -3,14 +3,15 @@
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
+from math import inf
 
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
 from falsifier.llm.prompts.courses import Array, jumps
-from falsifier.llm.prompts.numbers import column_decimals, value_text
+from falsifier.llm.prompts.numbers import column_decimals, plain, value_text
 from falsifier.llm.prompts.view import View
 
 # Changes that are told, and the conditions of one; recorded signals and inputs that are looked at.
@@ -19,6 +20,10 @@ _MOST_TOLD, _MOST_CONDITIONS, _MOST_RECORDED, _MOST_INPUTS = 6, 4, 24, 12
 # this share of the time, and in which some signal would be each time by chance with no more than this
 # probability.
 _NARROW, _SELDOM, _CHANCE = 0.1, 0.6, 0.1
+# An input's earlier values are told in place of the new ones if they differ by so much less.
+_CLEARLY = 0.5
+# Times may differ by one step of the output in so many, which is how accurate they are.
+_STEPS = 11
 # A signal with so many different changes counts: all that lead up are told together, and all that lead down.
 _COUNTS = 7
 # A signal that changes more often in a sample chatters, and nothing is told of it.
@@ -29,7 +34,13 @@ _TIMES = 100
 _JUMPS = "jumps"  # what a signal that is not discrete does
 _HEAD = (
     "So far, signals just before each change of a discrete signal, or jump of another one, and inputs at "
-    "that time, were as follows; what samples with the same beginning share counts once:"
+    "that time or until then, were as follows; what samples with the same beginning share counts once:"
+)
+# What is told of a signal: its value, that of an input that may just have changed, how long it had its value.
+_VALUE, _UNTIL, _UNCHANGED = (
+    "{name} {values}",
+    "{name} {values} until then",
+    "{name} unchanged for {values} s",
 )
 
 
@@ -51,15 +62,21 @@ class Regularities:
         inside = self.view.inside(trajectory)
         if not inside.columns.keys() >= set(self._names):
             return
-        then = np.stack([inside[name] for name in self._names])
-        before = np.roll(then, 1, axis=1)
-        before[len(self._recorded) :] = then[len(self._recorded) :]
-        self._known.append(then[:, :: max(1, len(inside) // _TIMES)])
-        rows = np.vstack((before, inside.times)).T + 0.0  # there are two zeros, with other bytes
+        values, times = np.stack([inside[name] for name in self._names]), inside.times
+        changed = np.diff(values, axis=1, prepend=values[:, :1]) != 0
+        since = np.maximum.accumulate(changed * np.arange(len(times)), axis=1)
+        unchanged = times - np.roll(times[since], 1, axis=1)
+        unchanged[:, 0] = 0.0
+        before, first = np.roll(values, 1, axis=1), len(self._recorded)  # of the inputs
+        known = np.vstack((values, values[first:], unchanged))
+        self._known.append(known[:, :: max(1, len(inside) // _TIMES)])
+        then = np.vstack((before[:first], values[first:], before[first:], unchanged, times))
+        rows = then.T + 0.0  # there are two zeros, with other bytes
         discrete = self.view.discrete(inside)
         for name in self._recorded:
             column = inside[name]
             changes = np.flatnonzero(np.diff(column)) + 1 if name in discrete else jumps(column)
+            changes = changes if name in discrete else changes[changes > 1]  # an output may begin anywhere
             if len(changes) > _CHATTERS:
                 self._chattering.add(name)
             if name in self._chattering:
@@ -89,6 +106,13 @@ class Regularities:
         inputs = [r.name for r in self.view.space.inputs if r.name not in self._recorded]
         return (*self._recorded, *inputs[:_MOST_INPUTS])
 
+    @cached_property
+    def _told(self) -> tuple[tuple[str, str], ...]:
+        """What is looked at at each change: of which signal, and how it is told."""
+        inputs = self._names[len(self._recorded) :]
+        forms = ((self._names, _VALUE), (inputs, _UNTIL), (self._names, _UNCHANGED))
+        return tuple((name, form) for names, form in forms for name in names)
+
     def _of(self, name: str, known: Array) -> Iterator[str]:
         counts = len(self._seen[name]) >= _COUNTS
         # It may have looked discrete in other samples.
@@ -103,21 +127,28 @@ class Regularities:
                 yield f"- {name} {change}, {len(seen)} times: {', '.join(so[:_MOST_CONDITIONS])}"
 
     def _common(self, seen: Array, known: Array, *, without: str) -> list[str]:
-        """Signals that were in a narrow range each time, and seldom are, the most telling ones first.
+        """What was in a narrow range each time, and seldom is, the most telling first, times at the end.
 
-        ``seen`` has their values then, ``known`` those at all times, shape (signals, times) each.
+        ``seen`` has its values then, ``known`` those at all times, shape (2 signals + inputs, times) each.
         """
-        found = []
-        for name, values, usual in zip(self._names, seen, known, strict=True):
-            ranges = [] if name == without else _ranges(values, float(np.ptp(usual)))
+        found, step = dict[tuple[bool, str], tuple[float, float, str]](), self.view.experiment.output_interval
+        for (name, form), values, usual in zip(self._told, seen, known, strict=True):
+            is_time = form == _UNCHANGED
+            span = float(max(values.max(), _STEPS * step) if is_time else np.ptp(usual))
+            ranges = [] if name == without and not is_time else _ranges(values, span)
             share = float(sum(((usual >= low) & (usual <= high)).mean() for low, high in ranges))
             # The first time in each range says where it is.
-            by_chance = len(self._names) * share ** (len(values) - len(ranges))
-            if ranges and share <= _SELDOM and by_chance <= _CHANCE:
-                digits = column_decimals(usual)
-                ends = (dict.fromkeys(value_text(self.view, name, v, digits) for v in one) for one in ranges)
-                found.append((share, f"{name} {' or '.join(map(' to '.join, ends))}"))
-        return [text for _, text in sorted(found)]
+            by_chance = len(self._told) * share ** (len(values) - len(ranges))
+            if not ranges or share > _SELDOM or by_chance > _CHANCE or (is_time and values.min() < 2 * step):
+                continue
+            width = sum(high - low for low, high in ranges)
+            if form == _UNTIL and width >= _CLEARLY * found.get((is_time, name), (0.0, inf))[1]:
+                continue
+            digits, told = column_decimals(usual), plain if is_time else partial(value_text, self.view, name)
+            ends = (dict.fromkeys(told(v, digits) for v in one) for one in ranges)
+            text = form.format(name=name, values=" or ".join(map(" to ".join, ends)))
+            found[is_time, name] = share, width, text
+        return [text for *_, text in sorted((is_time, *told) for (is_time, _), told in found.items())]
 
 
 def _ranges(values: Array, span: float) -> list[tuple[float, float]]:
