@@ -240,8 +240,12 @@ def course(
         for word, k in ends
     )
     if off > coarsest * float(np.ptp(column)):
-        spread = np.unique(np.linspace(0, len(times) - 1, most).round().astype(int)).tolist()
-        return f"irregular, at times {_pairs(_points(times, column, allowed, spread), clock)} ({extremes})"
+        edges = np.unique(np.linspace(0, len(times) - 1, most // 2 + 1).round().astype(int)).tolist()
+        spans = (column[a : b + 1] for a, b in pairwise(edges))
+        digits = decimals_for(float(np.ptp(column)), 3)
+        told = (f"{plain(part.min(), digits)} to {plain(part.max(), digits)}" for part in spans)
+        length = number((times[-1] - times[0]) / (len(edges) - 1), 2)
+        return f"irregular, least to greatest in each {length} s: {', '.join(told)} ({extremes})"
     return f"{text} ({within}; {extremes})"
 
 

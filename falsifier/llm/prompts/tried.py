@@ -1,21 +1,29 @@
 """Which values of what is chosen the samples have tried; told where the robustness gives no direction."""
 
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
 from falsifier.core.candidate import Candidate
-from falsifier.core.ranges import Range
+from falsifier.core.ranges import InputRange, Range
+from falsifier.core.signals import Signal
 from falsifier.core.words import listed
-from falsifier.llm.prompts.numbers import bounds
+from falsifier.llm.prompts.numbers import bounds, number
 from falsifier.llm.prompts.view import View
 
 # Share of a range that is told if no sample had a value in it.
 _WIDE = 0.3
 # Values of an interpolated input that count as tried, values that are listed, digits of the others.
 _VALUES, _MOST_LISTED, _DIGITS = 100, 6, 2
-# More different ranges, most of which do not matter, are not told.
+# More different ranges, or stays, most of which do not matter, are not told.
 _MOST_GAPS = 4
+# The longest stay at a value is told if it is shorter than this share of the simulation.
+_LONG = 0.3
+
+T = TypeVar("T", bound=Range)
 
 
 @dataclass(slots=True)
@@ -24,6 +32,7 @@ class Tried:
 
     view: View
     _values: dict[str, set[float]] = field(default_factory=dict)
+    _longest: dict[tuple[str, float], float] = field(default_factory=dict)  # stay in s of an input at a value
 
     def add(self, candidate: Candidate) -> None:
         """Add a sample."""
@@ -32,18 +41,16 @@ class Tried:
             if signal.interpolation != "constant":  # it passes through all between the least and the greatest
                 values = np.linspace(min(values), max(values), _VALUES).tolist()
             self._values.setdefault(name, set()).update(values)
+            for value, stay in _stays(signal, self.view.space.stop_time):
+                self._longest[name, value] = max(stay, self._longest.get((name, value), 0.0))
         for name, value in candidate.parameters.items():
             self._values.setdefault(name, set()).add(value)
 
     @property
     def gaps(self) -> str:
-        """What no sample tried; empty if they tried about all, or left out too many different ranges."""
-        alike: dict[str, list[str]] = {}
-        for r in self.view.space.ranges:
-            if gap := self._gap(r):
-                alike.setdefault(gap, []).append(r.name)
-        told = (f"{listed(names)} {gap}" for gap, names in alike.items())
-        return "; ".join(told) if len(alike) <= _MOST_GAPS else ""
+        """What no sample tried; empty if they tried about all, or left out too many different things."""
+        space = self.view.space
+        return "; ".join((*_alike(space.ranges, self._gap), *_alike(space.inputs, self._short)))
 
     def _gap(self, r: Range) -> str:
         tried = sorted(self._values.get(r.name, ()))
@@ -63,3 +70,41 @@ class Tried:
             else:
                 told.append(f"between {low} and {high}")
         return ", ".join(told)
+
+    def _short(self, r: InputRange) -> str:
+        """Values at which an input that may stay at one never stayed for long."""
+        if not (r.free or (r.interpolation == "constant" and r.control_points > 1)):
+            return ""
+        stays = {value: stay for (name, value), stay in self._longest.items() if name == r.name}
+        if r.kind == "real":
+            longest = max((stay for value, stay in stays.items() if r.low < value < r.high), default=0.0)
+            at = {longest: ["a value between its limits"]}
+        else:
+            at = {
+                stay: [str(int(v)) for v, s in sorted(stays.items()) if s == stay] for stay in stays.values()
+            }
+        told = (
+            f"at {', '.join(values[:_MOST_LISTED])} for more than {number(stay, _DIGITS + 1)} s"
+            for stay, values in sorted(at.items())
+            if 0 < stay < _LONG * self.view.space.stop_time
+        )
+        return ", ".join(told)
+
+
+def _alike(ranges: Sequence[T], of: Callable[[T], str]) -> list[str]:
+    """What is so of ranges, those of which the same is so together; nothing if too much is."""
+    alike: dict[str, list[str]] = {}
+    for r in ranges:
+        if text := of(r):
+            alike.setdefault(text, []).append(r.name)
+    return [f"{listed(names)} {text}" for text, names in alike.items()] if len(alike) <= _MOST_GAPS else []
+
+
+def _stays(signal: Signal, stop_time: float) -> Iterator[tuple[float, float]]:
+    """The values at which a signal stays, and for how long in s each time."""
+    signal = signal.stepped(stop_time)
+    starts = [0, *(k for k in range(1, len(signal.values)) if signal.values[k] != signal.values[k - 1])]
+    for start, stop in pairwise((*starts, len(signal.values))):
+        end = stop if signal.interpolation == "constant" else stop - 1
+        until = signal.times[end] if stop < len(signal.values) else stop_time
+        yield signal.values[start], until - signal.times[start]

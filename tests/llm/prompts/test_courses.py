@@ -83,15 +83,18 @@ def test_a_course_that_needs_more_points_says_how_exact_it_is() -> None:
     assert claimed < error <= float(within) <= 2 * error
 
 
-def test_of_what_is_too_irregular_points_and_extremes_are_told() -> None:
+def test_of_what_is_too_irregular_the_extremes_of_equal_parts_are_told() -> None:
     wild = np.random.default_rng(0).uniform(-1, 1, len(TIMES))
     wild[[300, 700]] = -2.0, 3.0
     told = course(TIMES, wild, clock=2, tolerance=0.1, slower_than=0.5, most=6, coarsest=0.3)
-    begin, end = "irregular, at times ", " (least -2 at 3 s, greatest 3 at 7 s)"
+    begin, end = "irregular, least to greatest in each 3.3 s: ", " (least -2 at 3 s, greatest 3 at 7 s)"
     assert told.startswith(begin) and told.endswith(end)
-    times, values = drawn_points(told.removeprefix(begin).removesuffix(end))
-    assert times == [0, 2, 4, 6, 8, 10]
-    assert values == pytest.approx(wild[[0, 200, 400, 600, 800, 1000]], abs=0.1)
+    spans = [
+        list(map(float, span.split(" to ")))
+        for span in told.removeprefix(begin).removesuffix(end).split(", ")
+    ]
+    parts = (wild[:334], wild[333:668], wild[667:])
+    assert np.array(spans) == pytest.approx(np.array([(part.min(), part.max()) for part in parts]), abs=0.005)
 
 
 def test_near_a_threshold_points_are_finer_once_the_rest_is_exact_enough() -> None:

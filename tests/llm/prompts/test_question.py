@@ -4,14 +4,15 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import ModelInfo, Variable
-from falsifier.core.ranges import InputRange, ParameterRange
-from falsifier.core.signals import Signal
+from falsifier.core.ranges import Freedom, InputRange, ParameterRange
+from falsifier.core.signals import Interpolation, Signal
 from falsifier.core.space import SearchSpace
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ChatError
@@ -391,3 +392,30 @@ def test_samples_are_the_best_by_how_long_what_must_recur_failed() -> None:
     _, changing = told(flat, "MP5", sampled(flat, [1.0, -1.0, -1.0, -1.0], [-1.0] * 4))
     assert "The robustness is flat" in changing
     assert re.search(r"u >= 0\.5 was false .* for \S+ s in sample 2, \S+ s in sample 1;", changing)
+
+
+def test_values_at_which_an_input_stayed_shortly_are_told() -> None:
+    free = Freedom(20, 0.1)
+    kinds: dict[str, Any] = {"interpolation": "constant", "control_points": 2}
+    inputs = (
+        InputRange("on", 0, 1, kind="integer", free=free, **kinds),
+        InputRange("u", 0, 1, free=free, **kinds),
+        InputRange("v", 0, 1, control_points=2, interpolation="linear"),
+    )
+    view = replace(View.of(PROBLEM), space=SearchSpace(inputs, (), 10.0))
+    tried = Tried(view)
+
+    def add(on: Sequence[float], u: Sequence[float], interpolation: Interpolation = "constant") -> None:
+        signals = {
+            "on": Signal((0.0, 2.5, 5.0, 6.0), tuple(on), "constant"),
+            "v": Signal((0.0, 10.0), (0.0, 1.0), "linear"),
+        }
+        signals["u"] = Signal((0.0, 1.0, 3.0, 4.0), tuple(u), interpolation)
+        tried.add(Candidate(signals))
+
+    add((1, 0, 1, 1), (0.0, 0.5, 0.5, 1.0), "linear")
+    assert tried.gaps.endswith(
+        "on at 0 for more than 2.5 s; u at a value between its limits for more than 2 s"
+    )
+    add((0, 0, 1, 1), (0.4, 0.5, 0.5, 0.5))
+    assert tried.gaps == ""
