@@ -240,7 +240,7 @@ def course(
         for word, k in ends
     )
     if off > coarsest * float(np.ptp(column)):
-        edges = np.unique(np.linspace(0, len(times) - 1, most // 2 + 1).round().astype(int)).tolist()
+        edges = np.unique(np.linspace(0, len(times) - 1, most + 1).round().astype(int)).tolist()
         spans = (column[a : b + 1] for a, b in pairwise(edges))
         digits = decimals_for(float(np.ptp(column)), 3)
         told = (f"{plain(part.min(), digits)} to {plain(part.max(), digits)}" for part in spans)
