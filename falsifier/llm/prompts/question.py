@@ -19,6 +19,7 @@ from falsifier.llm.messages import Message
 from falsifier.llm.prompts import published
 from falsifier.llm.prompts.advice import on_first, on_next
 from falsifier.llm.prompts.combinations import Combinations
+from falsifier.llm.prompts.effects import Effects
 from falsifier.llm.prompts.numbers import as_signals, number
 from falsifier.llm.prompts.observations import ROBUSTNESS_DIGITS, Signs, observed
 from falsifier.llm.prompts.reached import Reached, SampleProgress
@@ -98,7 +99,7 @@ class Questions:
         self._reached = Reached(view)
         self._tried = Tried(view)
         self._patterns = (Relations(view), Regularities(view))
-        self._combinations = Combinations(view)
+        self._combinations, self._effects = Combinations(view), Effects(view)
         self._recurring = recurring(view.requirement.formula)
         self._climb = Climb(view.counters, "sample")
 
@@ -124,6 +125,7 @@ class Questions:
                     self._start[name] = (min(values), max(values))
                 for collected in (*self._patterns, self._combinations):
                     collected.add(evaluation.trajectory)
+                self._effects.add(self._told, evaluation.candidate, evaluation.trajectory)
             self._shorten()
 
     def ask(
@@ -208,7 +210,7 @@ class Questions:
             yield f"{first}Propose the first {wanted}."
             return
         yield from self._standings()
-        yield from filter(None, (pattern.text for pattern in self._patterns))
+        yield from filter(None, (pattern.text for pattern in (*self._patterns, self._effects)))
         yield from notes
         if lessons and self._variant.has("lessons"):
             yield f"Your lessons so far: {lessons}"

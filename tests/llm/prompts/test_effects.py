@@ -1,0 +1,34 @@
+"""Samples whose signals are the same although what is chosen differed."""
+
+import numpy as np
+
+from falsifier.core.candidate import Candidate
+from falsifier.core.trajectory import Trajectory
+from falsifier.llm.prompts import View
+from falsifier.llm.prompts.effects import Effects
+from falsifier.testing import START, lag_problem
+
+TIMES = np.linspace(0.0, 10.0, 1001)
+
+
+def told(*samples: tuple[float, float, float]) -> str:
+    """What is told of samples, each from when its input is 1 and its output 1, in s, and a parameter."""
+    seen = Effects(View.of(lag_problem(parameters=[START])))
+    for number, (acts, reacts, start) in enumerate(samples, start=1):
+        columns = {"u": np.where(acts < TIMES, 1.0, 0.0), "x": TIMES / 9 + (reacts < TIMES)}
+        seen.add(number, Candidate({}, {"x0": start}), Trajectory(TIMES, columns))
+    return seen.text.partition("were the same in ")[2]
+
+
+def test_a_delay_and_what_never_matters_are_told_with_the_samples_that_show_it() -> None:
+    assert told((2.0, 4.0, 0.0), (3.0, 5.0, 0.0)) == (
+        "samples 1 and 2 until 3.99 s, though u differed at 2.09 s or before."
+    )
+    (alike, later) = told(*[(2.0 + k, 11.0, k / 4) for k in range(3)], (2.0, 9.0, 0.5)).split("; ")
+    assert alike == "samples 1, 2 and 3 until 10 s, though u and x0 differed at 0 s or before"
+    assert later == "samples 1 and 4 until 9 s, though x0 differed at 0 s or before."
+
+
+def test_nothing_is_told_where_signals_differ_as_soon_as_inputs_do() -> None:
+    assert told((2.0, 2.1, 0.0), (3.0, 3.1, 0.0)) == ""
+    assert told((2.0, 4.0, 0.0), (2.0, 4.0, 0.0)) == "", "nothing differed"
