@@ -8,7 +8,8 @@ _BY_NAMES = "If names or descriptions suggest how a violation comes about, begin
 _FIRST_OF = {
     "parameters": "the limits of the ranges are good first samples",
     "jumping": (
-        "go once through all values, each held for long enough, which shows what the system does with them"
+        "go through all values, each held for long enough, and to some of them again after others, which "
+        "shows what the system does with them and whether their order matters"
     ),
     "inputs": (
         "good first samples are the limits of the ranges, steps between these, of each input at times of its "
@@ -21,8 +22,8 @@ _ON_TIME = (
 )
 _STUCK = "The last two samples were no better."
 _ELSE = (
-    "Try something else{unless}: a short pulse, a small amplitude, a slow change, a faster repetition, or "
-    "values just inside the limits."
+    "Try something else{unless}: a short pulse, a small amplitude, a slow change, a faster repetition, "
+    "values just inside the limits, or one between them held for long."
 )
 _CLOSE = ", unless the best ones are close to a violation"
 

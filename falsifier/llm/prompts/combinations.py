@@ -3,7 +3,7 @@
 from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 
@@ -11,8 +11,8 @@ from falsifier.core.trajectory import Trajectory
 from falsifier.llm.prompts.numbers import value_text
 from falsifier.llm.prompts.view import View
 
-# Values of a signal that is looked at, signals, and combinations that are told.
-_MOST_VALUES, _MOST_SIGNALS, _MOST_TOLD = 6, 12, 8
+# Values of a signal that is looked at, of an input, signals, and values whose missing companions are told.
+_MOST_VALUES, _MOST_OF_INPUTS, _MOST_SIGNALS, _MOST_TOLD = 6, 12, 12, 8
 
 
 @dataclass(slots=True)
@@ -34,7 +34,7 @@ class Combinations:
         for name, column in columns.items():
             values, counts = np.unique(column, return_counts=True)
             self._times[name].update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
-        self._left = [n for n in columns if _has_few_whole_values(self._times[n])]
+        self._left = [n for n in columns if self._has_few_whole_values(n)]
         if self._left:
             states = np.unique(np.stack([columns[n] for n in self._left]), axis=1).tolist()
             for (one, these), (two, those) in combinations(zip(self._left, states, strict=True), 2):
@@ -54,17 +54,18 @@ class Combinations:
         return f"Never at one time so far: {'; '.join(text for _, text in found)}." if found else ""
 
     def _never(self) -> Iterator[tuple[float, str]]:
-        searched = self.view.space.names
+        searched, few = self.view.space.names, self._times
         for one, two in combinations(self._left or (), 2):
             if one in searched and two in searched:
                 continue
-            few, seen = self._times, self._seen[one, two]
-            for a, b in product(few[one], few[two]):
-                if (a, b) not in seen:
-                    expected = few[one][a] * few[two][b] / few[two].total()
-                    pair = (f"{n} {value_text(self.view, n, v)}" for n, v in ((one, a), (two, b)))
-                    yield expected, " with ".join(pair)
+            seen, all_times = self._seen[one, two], few[two].total()
+            for a in few[one]:
+                if others := [b for b in sorted(few[two]) if (a, b) not in seen]:
+                    expected = few[one][a] * sum(few[two][b] for b in others) / all_times
+                    told = ", ".join(value_text(self.view, two, b) for b in others)
+                    yield expected, f"{one} {value_text(self.view, one, a)} with {two} {told}"
 
-
-def _has_few_whole_values(times: Counter[float]) -> bool:
-    return len(times) <= _MOST_VALUES and all(value.is_integer() for value in times)
+    def _has_few_whole_values(self, name: str) -> bool:
+        values = self._times[name]
+        most = _MOST_OF_INPUTS if name in self.view.space.names else _MOST_VALUES
+        return len(values) <= most and all(value.is_integer() for value in values)

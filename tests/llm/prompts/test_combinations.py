@@ -36,6 +36,15 @@ def test_the_likeliest_combinations_that_never_came_about_are_told_first() -> No
     assert many.text == "", "a counter has too many values"
 
 
+def test_values_of_an_input_that_a_mode_has_not_seen_are_told_together() -> None:
+    view = View.of(lag_problem("G (x <= 0.9)"))
+    keys = (InputRange("key", 0, 9, control_points=2, kind="integer"),)
+    info = ModelInfo("m", variables=(Variable("x", kind="boolean"),))
+    seen = Combinations(replace(view, info=info, space=replace(view.space, inputs=keys)))
+    seen.add(Trajectory(TIMES, {"x": LATE, "key": np.minimum(TIMES // 1, 9.0)}))
+    assert seen.text == "Never at one time so far: x 1 with key 0, 1, 2, 3, 4, 5; x 0 with key 6, 7, 8, 9."
+
+
 def test_a_real_signal_that_looks_discrete_in_some_samples_only_is_not_mistaken() -> None:
     info = ModelInfo("m", variables=(Variable("x", kind="boolean"), Variable("mode")))
     view = View.of(lag_problem("G (x <= 0.9)"))
