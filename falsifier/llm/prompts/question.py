@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import one_line
-from falsifier.core.words import counted, shortened
+from falsifier.core.words import counted, listed, shortened
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
@@ -50,7 +50,9 @@ _LONGEST = (
     "more than the robustness: look at how that piece began and ended."
 )
 _UNTRIED = "Not tried so far: {}. See what happens there, too."
-_FLAT = "The robustness is flat: it was {lowest} in all {count} samples, so its value gives no direction."
+_FLAT = (
+    "The robustness is flat: it was {lowest} in all {count} samples{still}, so its value gives no direction."
+)
 
 # How much of a sample is told.
 _FULL, _SHORT, _LINE = range(3)
@@ -118,6 +120,7 @@ class Questions:
             if sample.robustness is not None:
                 self._judged.append(sample)
             if evaluation.trajectory is not None:  # the start values of a few points do not show everything
+                self._tried.observe(self._told, evaluation.candidate, evaluation.trajectory)
                 at_start = evaluation.trajectory.at(0.0)
                 for name in self._start.keys() & at_start.keys():
                     values = (*self._start[name], at_start[name])
@@ -208,7 +211,8 @@ class Questions:
             yield f"{first}Propose the first {wanted}."
             return
         yield from self._standings()
-        yield from filter(None, (pattern.text for pattern in self._patterns))
+        idle = self._tried.idle * (not self._reached.same.issuperset(self._view.recorded))
+        yield from filter(None, (idle, *(pattern.text for pattern in self._patterns)))
         yield from notes
         if lessons and self._variant.has("lessons"):
             yield f"Your lessons so far: {lessons}"
@@ -225,8 +229,13 @@ class Questions:
         ranked, levels = self._best_first(), self._climb.levels
         if len(ranked) < 2:
             return
+        # What decides is told once: here if it is flat because that never changes.
+        decider = self._climb.decider if self._is_flat() else None
+        still = decider.signals if decider and self._reached.same.issuperset(decider.signals) else ()
         if self._is_flat():
-            yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations)
+            unchanged = f", and {listed(still)} never changed" if still else ""
+            lowest, count = signed(levels.lowest, 3), levels.simulations
+            yield _FLAT.format(lowest=lowest, count=count, still=unchanged)
         if self._recurring and ranked[0].signs.failure:
             condition, limit = self._recurring.condition, self._recurring.length
             failed = [(s.number, s.signs.failure) for s in ranked[:_NAMED] if s.signs.failure]
@@ -242,10 +251,10 @@ class Questions:
             yield together
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
-            yield "\n".join((*few, *self._climb.lines))
+            yield from filter(None, ["\n".join((*few, *self._climb.lines[bool(still) :]))])
         if self._climb.is_told or self._is_flat() or self._is_stuck():
             untried = _UNTRIED.format(gaps) if (gaps := self._tried.gaps) else ""
-            yield from filter(None, (self._reached.extent, untried, self._combinations.text))
+            yield from filter(None, (self._reached.extent(still), untried, self._combinations.text))
 
     def _advice(self) -> Iterator[str]:
         """How to use the samples with a verdict, of which there are some."""

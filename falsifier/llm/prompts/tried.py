@@ -1,12 +1,15 @@
-"""Which values of what is chosen the samples have tried; told where the robustness gives no direction."""
+"""Which values of what is chosen the samples have tried, and which differences had no effect."""
 
+from collections import defaultdict
 from dataclasses import dataclass, field
+from hashlib import sha256
 
 import numpy as np
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.ranges import Range
-from falsifier.core.words import listed
+from falsifier.core.trajectory import Trajectory
+from falsifier.core.words import first_few, listed
 from falsifier.llm.prompts.numbers import bounds
 from falsifier.llm.prompts.view import View
 
@@ -24,6 +27,10 @@ class Tried:
 
     view: View
     _values: dict[str, set[float]] = field(default_factory=dict)
+    # Numbers of the samples with the same recorded signals, and what was chosen for them by name.
+    _same: defaultdict[bytes, tuple[list[int], defaultdict[str, set[object]]]] = field(
+        default_factory=lambda: defaultdict(lambda: ([], defaultdict(set)))
+    )
 
     def add(self, candidate: Candidate) -> None:
         """Add a sample."""
@@ -34,6 +41,32 @@ class Tried:
             self._values.setdefault(name, set()).update(values)
         for name, value in candidate.parameters.items():
             self._values.setdefault(name, set()).add(value)
+
+    def observe(self, number: int, candidate: Candidate, trajectory: Trajectory) -> None:
+        """Add what came of a sample."""
+        columns = self.view.inside(trajectory).columns
+        recorded = [columns[name] + 0.0 for name in self.view.recorded if name in columns]
+        numbers, chosen = self._same[sha256(np.array(recorded).tobytes()).digest()]
+        numbers.append(number)
+        for name in candidate.signals.keys() & columns.keys():
+            chosen[name].add(sha256((columns[name] + 0.0).tobytes()).digest())
+        for name, value in candidate.parameters.items():
+            chosen[name].add(value)
+
+    @property
+    def idle(self) -> str:
+        """In what most samples with the same recorded signals differ; empty if there are no two that do."""
+        found = []
+        for numbers, chosen in self._same.values():
+            if differing := [name for name in self.view.space.names if len(chosen[name]) > 1]:
+                found.append((-len(numbers), numbers, differing))
+        if not found:
+            return ""
+        _, numbers, differing = min(found)
+        which = f"{len(numbers)} samples, the first of them sample {numbers[0]},"
+        if len(numbers) <= _MOST_LISTED:
+            which = f"Samples {listed([*map(str, numbers)])}"
+        return f"{which} differ in {first_few(differing, _MOST_LISTED)}, and in no recorded signal."
 
     @property
     def gaps(self) -> str:

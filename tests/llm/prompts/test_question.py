@@ -169,9 +169,19 @@ def test_on_a_plateau_it_is_told_what_nothing_moved_and_what_was_not_tried() -> 
     )
     assert re.search(r"^Ranges so far: speed 0 to \S+, rpm \S+ to \S+\.$", changing, re.MULTILINE)
     _, same = told(problem, "MP5", sampled(problem, still, [0.0] * 7 + [300.0] * 3))
-    assert "The same in all samples: gear." in same
+    assert "in all 2 samples, and gear never changed, so its value gives no" in same, "told once"
+    assert "The same in all" not in same
     _, other = told(PROBLEM, "MP5", sampled(PROBLEM, [0.0] * 5, [0.5] * 5))
     assert "flat" not in other and "Lowest robustness so far: +0.4 in sample 2." in other
+
+
+def test_what_never_changed_is_told_once_and_which_differences_had_no_effect() -> None:
+    still = lag_problem(inputs=2, response=lambda t, inputs, _: {"x": 0.1 * np.maximum(inputs["u"], 0.0)})
+    _, flat = told(still, "MP5", sampled(still, *([-1.0] * 7 + [k / 9] for k in range(9))))
+    assert "+0.9 in all 9 samples, and x never changed" in flat and " decided the lowest" not in flat
+    assert "The same in all" not in flat and "differ in" not in flat, "nothing moves: that says it"
+    _, moving = told(still, "MP5", sampled(still, *([0, k % 3 / 2, 0, 0, 0, 0, 0, k / 9] for k in range(9))))
+    assert "Samples 1, 4 and 7 differ in v, and in no recorded signal." in moving
 
 
 def test_failed_samples_rationales_lessons_and_inputs_that_look_alike() -> None:
@@ -344,7 +354,7 @@ def test_no_range_is_told_of_a_signal_that_was_discrete_in_some_samples() -> Non
     reached = Reached(view)
     for column, extent in ((times / 20, "Ranges so far: x 0 to 0.5."), (times // 2, "")):
         reached.news(SampleProgress.of(view, Trajectory(times, {"x": column})))
-        assert reached.extent == extent
+        assert reached.extent(()) == extent
 
 
 @pytest.mark.parametrize(
