@@ -310,7 +310,8 @@ def _drawn(
     wanted = np.full_like(inside.times, claimed)
     for predicate in view.requirement.formula.predicates:
         if name in map(str, predicate.sides):
-            wanted = np.minimum(wanted, _OF_DISTANCE * np.abs(predicate.margin(inside.columns)))
+            # There may be no margin where the requirement does not look.
+            wanted = np.fmin(wanted, _OF_DISTANCE * np.abs(predicate.margin(inside.columns)))
     return courses.course(
         inside.times,
         column,

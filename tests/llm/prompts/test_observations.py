@@ -203,3 +203,9 @@ def test_of_an_absolute_value_the_course_of_the_signal_is_told(term: str, *, is_
         assert any(each.startswith("abs(") and ": 0:" in each for each in lines) == is_told
     assert any(each.startswith("x: ") for each in swings.full)
     assert any(each.startswith("x: ") for each in swings.short) != is_told
+
+
+def test_a_signal_is_told_as_exactly_where_what_it_is_compared_with_has_no_value() -> None:
+    x = np.linspace(-0.5, 0.4, 101)  # no root of it is real before 5.6 s, where nobody asks for one
+    (told, *_) = courses(*seen("G[7,10] (x <= 2*sqrt(x))", x))
+    assert told == "x: 0:-0.5 10:0.4"
