@@ -87,7 +87,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     """
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     assert verdict is not None
-    line = f"decided at t = {number(verdict.critical_time, 5)} s by {verdict.predicate}"
+    line = f"decided at t = {plain(verdict.critical_time, fine_clock(view))} s by {verdict.predicate}"
     if trajectory is None:
         return Observed((line,), (line,), line)
     grid = view.experiment

@@ -188,8 +188,8 @@ class Questions:
         if not self._samples or self._samples[-1].number != self._told:
             return ""
         sample = self._samples[-1]
-        told = {line.partition(":")[0] for line in sample.texts[sample.depth].splitlines()}
-        more = [line for line in sample.texts[_FULL].splitlines() if line.partition(":")[0] not in told]
+        told = {line.partition(": ")[0] for line in sample.texts[sample.depth].splitlines()}
+        more = [line for line in sample.texts[_FULL].splitlines() if line.partition(": ")[0] not in told]
         return "\n".join((f"More of sample {sample.number}:", *more)) if more else ""
 
     def _news(
@@ -343,11 +343,13 @@ class Questions:
         )
 
     def _alike(self, inputs: str) -> str:
-        """That a sample looks like an earlier one, if it does: numbers are rounded."""
+        """That a sample is, or looks like, an earlier one, if it does: numbers are rounded."""
         earlier = self._inputs.setdefault(inputs, self._told)
         if earlier == self._told:
             return ""
-        return f"these inputs are rounded: they differ from those of sample {earlier} by less than is shown"
+        return (
+            f"this is sample {earlier} again, or differs from it by less than is shown: numbers are rounded"
+        )
 
     def _shorten(self) -> None:
         """Tell less of samples if all of them together are too long."""

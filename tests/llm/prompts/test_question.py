@@ -22,6 +22,7 @@ from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.tried import Tried
 from falsifier.llm.usage import count_tokens
 from falsifier.problem.problem import Problem
+from falsifier.stl import Verdict
 from falsifier.testing import FREE, START, lag_problem
 from tests.llm.prompts.support import told, transmission
 
@@ -107,6 +108,20 @@ def test_the_latest_sample_is_told_in_full_beyond_the_usual_length(monkeypatch: 
         and "More of sample 40:\n" in last
         and "\n  x around t = " in last
     )
+
+
+def test_the_rest_of_the_latest_sample_has_all_signals_whose_names_begin_alike() -> None:
+    view, t = View.of(lag_problem("G[0,10] (x <= 9)")), np.linspace(0.0, 10.0, 101)
+    known = tuple(Variable(name) for name in ("x", "a:b", "a:c"))
+    grid = replace(view.experiment, outputs=("x", "a:b", "a:c"))
+    questions = Questions(
+        replace(view, info=ModelInfo("m", variables=known), experiment=grid), VARIANTS["MP5"]
+    )
+    made = Trajectory(t, {"x": 0.1 * np.sin(t), "u": 0 * t, "a:b": np.sign(np.sin(t)), "a:c": np.exp(-t)})
+    evaluation = Evaluation(PROBLEM.space.decode([0.0] * 5), "ok", Verdict(9.0, 1.0, "x <= 9"), "", made)
+    for _ in range(2):
+        questions.tell(evaluation)
+    assert "\n  a:c: 0:1 " in questions.ask()[1].content.partition("More of sample 2:")[2]
 
 
 def test_the_best_of_all_samples_are_named_and_stay(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -196,7 +211,7 @@ def test_failed_samples_rationales_lessons_and_inputs_that_look_alike() -> None:
     text = questions.ask(lessons="x follows u")[1].content
     assert "chosen because: a step up and on" in text and text.count("and on") < 50
     assert "Your lessons so far: x follows u" in text
-    assert text.count("these inputs are rounded: they differ from those of sample 1") == 1
+    assert text.count("this is sample 1 again, or differs from it by less than is shown") == 1
 
 
 def test_several_candidates_pending_ones_and_the_budget() -> None:
