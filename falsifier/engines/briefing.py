@@ -80,6 +80,10 @@ class Briefing:
         told = self.hidden(candidate)
         return in_one_line(told) if self.variant.has("names") else "; ".join(as_point(self.view, told))
 
+    def called(self, number: int) -> str:
+        """Return what a sample is called; the published prompts number only those that they show."""
+        return "an earlier sample" if self.variant.is_published else f"sample {number}"
+
     def reason(self, text: str) -> str:
         """Return a reason as the LLM may read it; empty if it has a name that the variant does not show."""
         if self.variant.has("names") and not self._disguise:

@@ -129,7 +129,8 @@ class Hybrid:
             if key in self._own:
                 self._own.discard(key)
                 self.turns.waited += 1
-                self._reasons.append(f"Sample {len(self._points)}: {evaluation.candidate.rationale}")
+                called = self.adviser.briefing.called(len(self._points)).capitalize()
+                self._reasons.append(f"{called}: {evaluation.candidate.rationale}")
                 del self._reasons[:-_MOST_REASONS]
             if key == self._awaited:
                 self._awaited = None
@@ -199,10 +200,11 @@ class Hybrid:
             return is_promising or self.turns.answers < _TRIAL or not self._is_trusted
         if is_promising and self._is_trusted:
             return True
+        briefing = self.adviser.briefing
         self._repeats.append(
-            f"Your candidate ({self.adviser.briefing.describe(candidate)}) was not simulated: sample "
-            f"{repeated} differs from it by at most {100 * _SAME:.2g} % of each range at any time. Suggest "
-            "another structure; the optimiser tunes numbers."
+            f"Your candidate ({briefing.describe(candidate)}) was not simulated: {briefing.called(repeated)} "
+            f"differs from it by at most {100 * _SAME:.2g} % of each range at any time. Suggest another "
+            "structure; the optimiser tunes numbers."
         )
         return False
 

@@ -172,13 +172,11 @@ class LLMEngine:
     def _new(self, proposed: Sequence[Candidate]) -> list[Candidate]:
         """Return the new ones of the proposed candidates; RejectedReplyError if there is none."""
         briefing = self.briefing
-        seen: dict[Hashable, str] = {key: f"sample {number}" for key, number in briefing.numbers.items()}
+        seen: dict[Hashable, str] = {key: briefing.called(n) for key, n in briefing.numbers.items()}
         seen |= {c.key: "one that was proposed already" for c in briefing.pending}
         new = {c.key: c for c in proposed if c.key not in seen}
         if not new:
-            # The published prompts number only the samples that they show.
-            which = "an earlier sample" if briefing.variant.is_published else seen[proposed[0].key]
-            raise RejectedReplyError(f"it repeats {which}")
+            raise RejectedReplyError(f"it repeats {seen[proposed[0].key]}")
         return list(new.values())
 
 

@@ -133,6 +133,11 @@ class Climb:
         return self.levels.lowest >= 0 and (self.levels.is_plateau or self.levels.is_staircase)
 
     @property
+    def decider(self) -> Predicate | None:
+        """The comparison that decides the lowest level, of which the first line tells; None if unknown."""
+        return self._lowest and self._lowest[0]
+
+    @property
     def lines(self) -> list[str]:
         """What is missing for a lower level."""
         return [*self._decided(), *self._counting()]

@@ -63,6 +63,7 @@ def check_chat(chat: Chat) -> tuple[list[Feature], Usage]:
         reply = chat.complete(_request("Count from 1 to 100 in words.", most=_CUT))
     except ChatError as error:
         features.append(Feature("length", works=False, said=str(error)))
+        usage += error.lost or Usage(cost=0.0)
     else:
         usage += reply.usage
         works = reply.finish_reason == "length"

@@ -5,10 +5,10 @@ assumed units and two examples.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from falsifier.core.experiment import Experiment
 from falsifier.core.literals import one_line
@@ -117,6 +117,10 @@ def _variable(v: Variable) -> str:
     return f"- {v.name} ({', '.join(facts)})" + (f": {v.description}" if v.description else "")
 
 
+# That nothing is to be said, LLMs write as null, too.
+_Text = Annotated[str, BeforeValidator(lambda found: "" if found is None else found)]
+
+
 class _Reply(BaseModel):
     model_config = ConfigDict(extra="ignore", frozen=True, allow_inf_nan=False, defer_build=True)
 
@@ -125,7 +129,7 @@ class AssumedUnit(_Reply):
     """The unit that a reading assumes for a signal."""
 
     signal: str
-    unit: str
+    unit: _Text
 
 
 class ExampleSignal(_Reply):
@@ -140,7 +144,7 @@ class ReadingReply(_Reply):
     """One reading of the sentence."""
 
     formula: str
-    meaning: str = Field(default="", description="In words, and how it differs from the other readings.")
+    meaning: _Text = Field(default="", description="In words, and how it differs from the other readings.")
     units: list[AssumedUnit] = Field(default_factory=list)
     satisfied: list[ExampleSignal] = Field(default_factory=list)
     violated: list[ExampleSignal] = Field(default_factory=list)
@@ -150,7 +154,7 @@ class ReadingsReply(_Reply):
     """All readings of the sentence, the most probable first."""
 
     readings: list[ReadingReply] = Field(max_length=MOST_READINGS)
-    cannot: str = Field(default="", description="Why no formula says it; only if there are no readings.")
+    cannot: _Text = Field(default="", description="Why no formula says it; only if there are no readings.")
 
 
 def readings_schema() -> dict[str, Any]:

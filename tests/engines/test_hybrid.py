@@ -153,6 +153,16 @@ def test_an_answer_that_repeats_a_sample_is_not_simulated_and_the_model_is_told(
     assert len(told) == 1 and "10 % of each range" in told[0]
 
 
+def test_samples_are_called_by_no_number_where_those_told_are_numbered_anew() -> None:
+    problem = wide_problem()
+    engine, script = hybrid(problem, [[-1.0], [-1.1], [-1.2]])
+    script.briefing = Briefing(problem, variant="MP4")
+    drive(engine, partial(evaluate, problem), rounds=40)
+    notes = "\n".join(script.notes[2])
+    assert "not simulated: an earlier sample differs from it" in notes
+    assert "shares this search chose: An earlier sample: surrogate: " in notes
+
+
 @pytest.mark.parametrize("rounding", [0.0, 1e-6])
 def test_what_both_halves_would_do_next_is_simulated_once(rounding: float) -> None:
     problem = wide_problem()

@@ -52,6 +52,9 @@ def test_a_limit_that_is_not_kept() -> None:
     found, _ = checked(GOOD, Step("one two three", finish="stop"))
     assert [f.works for f in found.values()] == [True, False]
     assert "not kept" in found["length"].said
+    found, usage = checked(GOOD, Step(raw='{"choices": []}'))
+    assert "without any choice" in found["length"].said
+    assert usage.without_reply == 1 and usage.tokens > 120, "it has been sent and is paid for"
 
 
 def test_a_wrong_key_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:

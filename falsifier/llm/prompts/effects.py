@@ -1,6 +1,6 @@
 """What had no effect: samples whose signals are the same for some time after what is chosen differed."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from zlib import crc32
 
@@ -9,13 +9,15 @@ from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import listed
+from falsifier.core.words import first_few, listed
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import coarse_clock, plain
 from falsifier.llm.prompts.view import View
 
 # Equal parts of a simulation that are compared, parts without effect from which on it is told, samples told.
 _PARTS, _LONG, _MOST_TOLD = 100, 5, 3
+# Samples and names that are listed.
+_MOST_LISTED = 6
 
 Checksums = NDArray[np.int64]
 
@@ -75,8 +77,8 @@ class Effects:
         """In which samples what was chosen had no effect for the longest time; empty if in none."""
         longest = sorted(self._alike.values(), key=lambda a: a.begin - a.end)[:_MOST_TOLD]
         told = (
-            f"samples {listed([*map(str, a.numbers)])} until {self._ends[a.end]} s, though "
-            f"{listed([name for name in self.view.space.names if name in a.differing])} differed at "
+            f"samples {_few([*map(str, a.numbers)])} until {self._ends[a.end]} s, though "
+            f"{_few([name for name in self.view.space.names if name in a.differing])} differed at "
             f"{self._ends[a.begin]} s or before"
             for a in longest
         )
@@ -85,6 +87,10 @@ class Effects:
             if longest
             else ""
         )
+
+
+def _few(names: Sequence[str]) -> str:
+    return listed(names) if len(names) <= _MOST_LISTED else first_few(names, _MOST_LISTED)
 
 
 def _checksums(parts: Iterable[Array]) -> list[int]:

@@ -171,17 +171,17 @@ def _signal_text_in(r: InputRange, signal: Signal, stop_time: float, *, in_brief
     if signal.interpolation == "constant" and rounded.switches > _MOST_PIECES:
         rough = _merged(rounded, _ROUGHLY * (r.high - r.low))
         if in_brief and rough.switches > _MOST_IN_BRIEF:
-            return _described(rough, stop_time, decimals)
+            return _described(rounded, rough, stop_time, decimals)
         if rough.switches < rounded.switches:
             return f"told within {_ROUGHLY:.0%} of the range: {signal_text(rough, stop_time=stop_time)}"
     return signal_text(rounded, stop_time=stop_time)
 
 
-def _described(signal: Signal, stop_time: float, decimals: int) -> str:
-    """What is to be known of constant pieces that are not listed."""
-    lengths = np.diff((*signal.times, stop_time))
+def _described(signal: Signal, merged: Signal, stop_time: float, decimals: int) -> str:
+    """What is to be known of constant pieces that are not listed; those that differ little count as one."""
     low, high = (plain(v, decimals) for v in (min(signal.values), max(signal.values)))
-    mean = plain(float(np.average(signal.values, weights=lengths)), decimals)
+    mean = plain(float(np.average(signal.values, weights=np.diff((*signal.times, stop_time)))), decimals)
+    lengths = np.diff((*merged.times, stop_time))
     apart = [number(float(f(lengths)), 3) for f in (np.min, np.median, np.max)]
     return (
         f"{len(lengths)} constant pieces between {low} and {high}, mean {mean}, "

@@ -87,7 +87,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     """
     verdict, trajectory = evaluation.verdict, evaluation.trajectory
     assert verdict is not None
-    line = f"decided at t = {number(verdict.critical_time, 5)} s by {verdict.predicate}"
+    line = f"decided at t = {plain(verdict.critical_time, fine_clock(view))} s by {verdict.predicate}"
     if trajectory is None:
         return Observed((line,), (line,), line)
     grid = view.experiment
@@ -310,7 +310,8 @@ def _drawn(
     wanted = np.full_like(inside.times, claimed)
     for predicate in view.requirement.formula.predicates:
         if name in map(str, predicate.sides):
-            wanted = np.minimum(wanted, _OF_DISTANCE * np.abs(predicate.margin(inside.columns)))
+            # There may be no margin where the requirement does not look.
+            wanted = np.fmin(wanted, _OF_DISTANCE * np.abs(predicate.margin(inside.columns)))
     return courses.course(
         inside.times,
         column,

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.literals import one_line
-from falsifier.core.words import counted, shortened
+from falsifier.core.words import counted, listed, shortened
 from falsifier.errors import ChatError
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.evaluation.levels import Climb
@@ -51,7 +51,9 @@ _LONGEST = (
     "more than the robustness: look at how that piece began and ended."
 )
 _UNTRIED = "Not tried so far: {}. See what happens there, too."
-_FLAT = "The robustness is flat: it was {lowest} in all {count} samples, so its value gives no direction."
+_FLAT = (
+    "The robustness is flat: it was {lowest} in all {count} samples{still}, so its value gives no direction."
+)
 
 # How much of a sample is told.
 _FULL, _SHORT, _LINE = range(3)
@@ -187,8 +189,8 @@ class Questions:
         if not self._samples or self._samples[-1].number != self._told:
             return ""
         sample = self._samples[-1]
-        told = {line.partition(":")[0] for line in sample.texts[sample.depth].splitlines()}
-        more = [line for line in sample.texts[_FULL].splitlines() if line.partition(":")[0] not in told]
+        told = {line.partition(": ")[0] for line in sample.texts[sample.depth].splitlines()}
+        more = [line for line in sample.texts[_FULL].splitlines() if line.partition(": ")[0] not in told]
         return "\n".join((f"More of sample {sample.number}:", *more)) if more else ""
 
     def _news(
@@ -227,8 +229,13 @@ class Questions:
         ranked, levels = self._best_first(), self._climb.levels
         if len(ranked) < 2:
             return
+        # What decides is told once: here if it is flat because that never changes.
+        decider = self._climb.decider if self._is_flat() else None
+        still = decider.signals if decider and self._reached.same.issuperset(decider.signals) else ()
         if self._is_flat():
-            yield _FLAT.format(lowest=signed(levels.lowest, 3), count=levels.simulations)
+            unchanged = f", and {listed(still)} never changed" if still else ""
+            lowest, count = signed(levels.lowest, 3), levels.simulations
+            yield _FLAT.format(lowest=lowest, count=count, still=unchanged)
         if self._recurring and ranked[0].signs.failure:
             condition, limit = self._recurring.condition, self._recurring.length
             failed = [(s.number, s.signs.failure) for s in ranked[:_NAMED] if s.signs.failure]
@@ -244,10 +251,10 @@ class Questions:
             yield together
         if self._climb.is_told:
             few = [f"Few values of {levels.told('sample')}."] if levels.is_staircase else []
-            yield "\n".join((*few, *self._climb.lines))
+            yield from filter(None, ["\n".join((*few, *self._climb.lines[bool(still) :]))])
         if self._climb.is_told or self._is_flat() or self._is_stuck():
             untried = _UNTRIED.format(gaps) if (gaps := self._tried.gaps) else ""
-            yield from filter(None, (self._reached.extent, untried, self._combinations.text))
+            yield from filter(None, (self._reached.extent(still), untried, self._combinations.text))
 
     def _advice(self) -> Iterator[str]:
         """How to use the samples with a verdict, of which there are some."""
@@ -336,11 +343,13 @@ class Questions:
         )
 
     def _alike(self, inputs: str) -> str:
-        """That a sample looks like an earlier one, if it does: numbers are rounded."""
+        """That a sample is, or looks like, an earlier one, if it does: numbers are rounded."""
         earlier = self._inputs.setdefault(inputs, self._told)
         if earlier == self._told:
             return ""
-        return f"these inputs are rounded: they differ from those of sample {earlier} by less than is shown"
+        return (
+            f"this is sample {earlier} again, or differs from it by less than is shown: numbers are rounded"
+        )
 
     def _shorten(self) -> None:
         """Tell less of samples if all of them together are too long."""

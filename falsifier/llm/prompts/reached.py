@@ -1,6 +1,6 @@
 """How far the recorded signals of a sample got, which says more than a robustness that is flat."""
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -141,16 +141,23 @@ class Reached:
         return f"{words} ({others})" if others else words
 
     @property
-    def extent(self) -> str:
-        """Which signals were the same in all samples, and how far the others went."""
-        moved = {name for name, before, _ in self._stages if before is not None}
-        moved |= {name for name, (low, high) in self._ranges.items() if low < high}
-        values = Counter(name for name, before, _ in self._stages if before is None)
-        known = [n for n in self._view.recorded if n in values or n in self._ranges]
-        same = [name for name in known if name not in moved and values[name] < 2]
+    def same(self) -> frozenset[str]:
+        """Signals that had one value, at all times in all samples."""
+        found: defaultdict[str, set[float]] = defaultdict(set)
+        for name, _, value in self._stages:
+            found[name].add(value)
+        for name, ends in self._ranges.items():
+            found[name].update(ends)
+        return frozenset(name for name, values in found.items() if len(values) == 1)
+
+    def extent(self, told: Collection[str]) -> str:
+        """Which signals were the same in all samples, unless it is told, and how far the others went."""
+        values = {name for name, _, _ in self._stages}
+        left = self.same.difference(told)
+        same = [name for name in self._view.recorded if name in left]
         ranges = []
         for name, (low, high) in list(self._ranges.items())[:_MOST_BESIDE]:
-            if low < high and not values[name]:
+            if low < high and name not in values:
                 ends = (number(end, resolving(end, high - low, 3)) for end in (low, high))
                 ranges.append(f"{name} {' to '.join(ends)}")
         found = [f"The same in all samples: {', '.join(same)}."] if same else []

@@ -63,6 +63,9 @@ def test_in_brief_a_signal_of_many_pieces_is_only_described() -> None:
         "u: 31 constant pieces between 0 and 1, mean 0.375, each 0.25 to 2.5 s long, 0.25 s in the median",
         *REST,
     )
+    wavy = replace(signal, values=tuple(float(k % 2) or 0.03 * (k % 4) / 2 - 0.03 for k in range(31)))
+    (first, *_) = as_signals(VIEW, replace(made, signals={**made.signals, "u": wavy}), in_brief=True)
+    assert "31 constant pieces between -0.03 and 1, mean " in first, "whatever of it is merged"
     assert as_signals(VIEW, STEP, in_brief=True) == as_signals(VIEW, STEP)
     assert "[[0, 0], [2.5, 1], [2.75, 0]" in as_signals(VIEW, made)[0]
 

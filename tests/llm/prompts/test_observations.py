@@ -203,3 +203,20 @@ def test_of_an_absolute_value_the_course_of_the_signal_is_told(term: str, *, is_
         assert any(each.startswith("abs(") and ": 0:" in each for each in lines) == is_told
     assert any(each.startswith("x: ") for each in swings.full)
     assert any(each.startswith("x: ") for each in swings.short) != is_told
+
+
+def test_a_signal_is_told_as_exactly_where_what_it_is_compared_with_has_no_value() -> None:
+    x = np.linspace(-0.5, 0.4, 101)  # no root of it is real before 5.6 s, where nobody asks for one
+    (told, *_) = courses(*seen("G[7,10] (x <= 2*sqrt(x))", x))
+    assert told == "x: 0:-0.5 10:0.4"
+
+
+def test_a_late_critical_time_is_told_exactly_in_one_line() -> None:
+    problem = lag_problem("G[0,200000] (x <= 9)")
+    space = replace(problem.space, stop_time=200_000.0)
+    long = replace(problem, experiment=Experiment(200_000.0, 1.0, ("x",)), space=space)
+    times = long.experiment.times
+    trajectory = Trajectory(times, {"x": np.exp(-(((times - 123_457) / 1e4) ** 2)), "u": 0 * times})
+    verdict = monitor_for(long).evaluate(trajectory)
+    made = Evaluation(Candidate({"u": Signal((0.0,), (0.0,), "constant")}), "ok", verdict, "", trajectory)
+    assert observed(View.of(long), made).line.startswith("decided at t = 123457 s by x <= 9")

@@ -23,6 +23,7 @@ from falsifier.llm.prompts.reached import Reached, SampleProgress
 from falsifier.llm.prompts.tried import Tried
 from falsifier.llm.usage import count_tokens
 from falsifier.problem.problem import Problem
+from falsifier.stl import Verdict
 from falsifier.testing import FREE, START, lag_problem
 from tests.llm.prompts.support import told, transmission
 
@@ -110,6 +111,20 @@ def test_the_latest_sample_is_told_in_full_beyond_the_usual_length(monkeypatch: 
     )
 
 
+def test_the_rest_of_the_latest_sample_has_all_signals_whose_names_begin_alike() -> None:
+    view, t = View.of(lag_problem("G[0,10] (x <= 9)")), np.linspace(0.0, 10.0, 101)
+    known = tuple(Variable(name) for name in ("x", "a:b", "a:c"))
+    grid = replace(view.experiment, outputs=("x", "a:b", "a:c"))
+    questions = Questions(
+        replace(view, info=ModelInfo("m", variables=known), experiment=grid), VARIANTS["MP5"]
+    )
+    made = Trajectory(t, {"x": 0.1 * np.sin(t), "u": 0 * t, "a:b": np.sign(np.sin(t)), "a:c": np.exp(-t)})
+    evaluation = Evaluation(PROBLEM.space.decode([0.0] * 5), "ok", Verdict(9.0, 1.0, "x <= 9"), "", made)
+    for _ in range(2):
+        questions.tell(evaluation)
+    assert "\n  a:c: 0:1 " in questions.ask()[1].content.partition("More of sample 2:")[2]
+
+
 def test_the_best_of_all_samples_are_named_and_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("falsifier.llm.prompts.question.MOST_PROMPT_TOKENS", 2600)
     evaluations = sampled(PROBLEM, *np.random.default_rng(3).uniform(-1, 1, (40, 5)))
@@ -170,9 +185,19 @@ def test_on_a_plateau_it_is_told_what_nothing_moved_and_what_was_not_tried() -> 
     )
     assert re.search(r"^Ranges so far: speed 0 to \S+, rpm \S+ to \S+\.$", changing, re.MULTILINE)
     _, same = told(problem, "MP5", sampled(problem, still, [0.0] * 7 + [300.0] * 3))
-    assert "The same in all samples: gear." in same
+    assert "in all 2 samples, and gear never changed, so its value gives no" in same, "told once"
+    assert "The same in all" not in same
     _, other = told(PROBLEM, "MP5", sampled(PROBLEM, [0.0] * 5, [0.5] * 5))
     assert "flat" not in other and "Lowest robustness so far: +0.4 in sample 2." in other
+
+
+def test_what_never_changed_is_told_once_and_which_differences_had_no_effect() -> None:
+    still = lag_problem(inputs=2, response=lambda t, inputs, _: {"x": 0.1 * np.maximum(inputs["u"], 0.0)})
+    _, flat = told(still, "MP5", sampled(still, *([-1.0] * 7 + [k / 9] for k in range(9))))
+    assert "+0.9 in all 9 samples, and x never changed" in flat and " decided the lowest" not in flat
+    assert "The same in all" not in flat and "Without effect" not in flat, "nothing moves: that says it"
+    _, moving = told(still, "MP5", sampled(still, *([0, k % 3 / 2, 0, 0, 0, 0, 0, k / 9] for k in range(9))))
+    assert "samples 2, 5 and 8 until 10 s, though v differed at 6.7 s or before; samples 3, 6" in moving
 
 
 def test_failed_samples_rationales_lessons_and_inputs_that_look_alike() -> None:
@@ -187,7 +212,7 @@ def test_failed_samples_rationales_lessons_and_inputs_that_look_alike() -> None:
     text = questions.ask(lessons="x follows u")[1].content
     assert "chosen because: a step up and on" in text and text.count("and on") < 50
     assert "Your lessons so far: x follows u" in text
-    assert text.count("these inputs are rounded: they differ from those of sample 1") == 1
+    assert text.count("this is sample 1 again, or differs from it by less than is shown") == 1
 
 
 def test_several_candidates_pending_ones_and_the_budget() -> None:
@@ -345,7 +370,7 @@ def test_no_range_is_told_of_a_signal_that_was_discrete_in_some_samples() -> Non
     reached = Reached(view)
     for column, extent in ((times / 20, "Ranges so far: x 0 to 0.5."), (times // 2, "")):
         reached.news(SampleProgress.of(view, Trajectory(times, {"x": column})))
-        assert reached.extent == extent
+        assert reached.extent(()) == extent
 
 
 @pytest.mark.parametrize(
