@@ -108,6 +108,14 @@ def test_keys_of_too_many_parts_are_refused_before_they_are_read(tmp_path: Path,
             read_spec(path)
 
 
+@pytest.mark.parametrize("text", ["model.fmu = {}", "components.a.fmu = {}", "context.files = [{}]"])
+def test_what_can_be_no_path_is_named(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(text.format(r'"a\u0000.fmu"') + "\nrequirements.R.formula = 'x <= 1'")
+    with pytest.raises(SpecError, match=r"a\.toml: 'a\\x00\.fmu': no file has .* NUL"):
+        read_spec(path)
+
+
 def test_what_is_told_of_an_fmu_is_said_by_its_folders() -> None:
     """Those of ``context.files.inside``; its description, with annotations, is not among them."""
     said = ContextSection.model_fields["fmu"].description or ""
