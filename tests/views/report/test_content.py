@@ -3,6 +3,7 @@ from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
+from falsifier.campaigns.analysis import load
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.store import load_counterexample, save, to_store
@@ -18,7 +19,7 @@ from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.testing import lag_problem
 from falsifier.views.report import markdown_report
 from falsifier.views.report.content import gather
-from falsifier.views.report.page import html_report
+from falsifier.views.report.page import _runs, html_report
 from falsifier.views.report.wording import run_command
 from tests.campaigns.support import record_ad_hoc
 from tests.problems import hard, mostly_broken
@@ -97,16 +98,23 @@ def test_a_search_can_be_repeated_from_its_command() -> None:
         name="openai/gpt-5-mini",
         effort="high",
         variant="MP4",
-        price=(0.25, 2),
+        price=(0.12345678, 2),
         anonymous=True,
         timeout=30,
         cache=False,
     )
     asked = RunRequest(problems=(ProblemSource(target="AT1"),), llm=model, budget=Budget(None, 9.0))
     assert run_command(asked) == (
-        "falsifier run AT1 --llm openai/gpt-5-mini@high --variant MP4 --llm-option price=0.25:2 "
+        "falsifier run AT1 --llm openai/gpt-5-mini@high --variant MP4 --llm-option price=0.12345678:2 "
         "--llm-option timeout=30 --llm-option cache=no --anonymous --seconds 9.0 --seed 0"
     )
+
+
+def test_how_long_slow_simulations_take_is_a_plain_number(tmp_path: Path) -> None:
+    falsify(hard(), "uniform", budget=1, directory=tmp_path)
+    (run,) = load(tmp_path)
+    slow = replace(run, spent=replace(run.spent, simulation_seconds=1234.5))
+    assert "simulation 1234.5, proposal" in _runs([slow])
 
 
 def test_causes_of_failures_and_what_was_not_searched_are_in_every_report(tmp_path: Path) -> None:
