@@ -61,7 +61,7 @@ class Shown:
         journal = self.run.directory / JOURNAL
         if self._is_doubtful or not file.is_file() or file.stat().st_mtime < journal.stat().st_mtime:
             return ""  # of a run without a counterexample it is about the nearest miss
-        return file.read_text(encoding="utf-8").strip()
+        return file.read_text(encoding="utf-8", errors="replace").strip()
 
     @property
     def _is_doubtful(self) -> bool:

@@ -158,6 +158,8 @@ def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_an
     times = (*signal.times[:-1], signal.times[-1] + 1e-7)
     rounder = replace(shown.candidate, signals={"u": replace(signal, times=times)})
     assert replace(shown, candidate=rounder).what == "shrunk counterexample", "also by digits not shown"
+    (tmp_path / "explanation.txt").write_bytes(b"Because \xff")
+    assert "Because \N{REPLACEMENT CHARACTER}" in html_report(tmp_path)
     os.utime(tmp_path / "explanation.txt", (0, 0))
     assert not gather(tmp_path)[0].sections[0].shown[0].explanation, "the run went on since"
     (tmp_path / "shrunk.npz").write_bytes(b"damaged")
