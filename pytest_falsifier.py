@@ -372,7 +372,7 @@ def _tell_doubts(item: pytest.Item, checked: "Checked", *, strict: bool) -> None
     name, result = checked.problem.name, checked.result
     untested = [f.text for f in result.findings if f.untested] if result else []
     untested += [failure.text for failure in result.failures] if result else []
-    again = ((file, r) for file, r in checked.replayed.items() if r.status == "fragile")
+    again = ((file, r) for file, r in checked.replayed.items() if r.confirmation)
     unconfirmed = [f"{_short(file)}: {replayed.text}" for file, replayed in again]
     unconfirmed += [f"{c.outcome}: {c.reason}" for c in (*result.fragile, *result.refuted)] if result else []
     told: list[tuple[type[RequirementWarning], str, list[str]]] = [

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -279,3 +280,6 @@ def test_a_violation_that_is_not_confirmed_is_a_warning_and_with_strict_an_error
     stored = check(problem, engine="uniform", budget=1, database=database)
     with pytest.raises(UntestedError, match=f"{file.name}: LAG: fragile"):
         _tell_doubts(request.node, stored, strict=True)
+    doubted = replace(stored.replayed[file], status="does not violate")  # it did, but not again
+    with pytest.raises(UntestedError, match=f"{file.name}: LAG: "):
+        _tell_doubts(request.node, replace(stored, replayed={file: doubted}), strict=True)

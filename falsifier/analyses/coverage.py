@@ -36,6 +36,8 @@ PACES = ("constant", "slow", "medium", "fast", "steps")
 SLOW, FAST = 1 / 2, 1 / 20
 # Points of a cubic piece at which its slope is calculated.
 _PER_PIECE = np.linspace(0.0, 1.0, 5)
+# Times between two control points, so close that an interpolated input meets each part between them.
+_STEPS = 2 * PARTS
 # Slices of the simulated time in which the values of an input are counted.
 SLICES = 40
 # Samples of an input over the simulated time: several per slice.
@@ -212,10 +214,10 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
             seen.reach(trajectory)
     stop_time = described.stop_time
     times = np.linspace(0.0, stop_time, _SAMPLES)
-    # Also when any input has a new value, if sampled and held, from the next sampling on: it may be brief.
-    begun = [{t + 0.999999 * (s.hold or 0) for s in c.signals.values() for t in s.times} for c in candidates]
+    # Also when any input has a new value, which may be brief.
+    begun = [np.unique(np.concatenate([times[:0], *map(_begun, c.signals.values())])) for c in candidates]
     most = max(map(len, begun), default=0)
-    moments = [np.minimum(np.append(times, np.resize(sorted(b), most)), stop_time) for b in begun]
+    moments = [np.minimum(np.append(times, np.resize(b, most)), stop_time) for b in begun]
     ranges = []
     for r in described.inputs:
         signals = [c.signals[r.name].stepped(stop_time) for c in candidates]
@@ -239,6 +241,17 @@ def coverage_of(described: Manifest, tried: Tried, *, failures: tuple[Failure, .
         outputs=tuple(seen.outputs.values()),
         modes=tuple(map(seen.mode, seen.labels)),
     )
+
+
+def _begun(signal: Signal) -> Array:
+    """Return times in s at which an input has new values, shape (n,): all parts that it passes are met.
+
+    If it is sampled and held, it has them from the next sampling on.
+    """
+    numbers = points = np.arange(len(signal.times), dtype=np.float64)
+    if signal.interpolation != "constant":
+        points = np.arange(points[-1] * _STEPS + 1) / _STEPS
+    return np.interp(points, numbers, signal.times) + 0.999999 * (signal.hold or 0.0)
 
 
 def _of_range(r: Range, tried: Sequence[ArrayLike], paces: Mapping[str, int]) -> tuple[RangeCoverage, Cells]:

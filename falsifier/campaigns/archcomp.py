@@ -11,12 +11,13 @@ import csv
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from math import isfinite
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
 
 from falsifier.campaigns.runs import Run
 from falsifier.campaigns.tables import read_published
@@ -125,7 +126,10 @@ class Row(BaseModel):
     parameters: Annotated[Matrix, BeforeValidator(_matrix)] = np.empty((1, 0))
     falsified: bool = False  # whether the tool claims a counterexample
     simulations: int = Field(ge=0)  # number of simulations used
-    robustness: float | None = None  # robustness that the tool claims, if stated
+    # Robustness that the tool claims, if it is stated and finite.
+    robustness: Annotated[float | None, AfterValidator(lambda r: r if r is None or isfinite(r) else None)] = (
+        None
+    )
     stop_time: float | None = Field(None, alias="stop time")  # end of the simulation in s, if stated
 
 

@@ -21,9 +21,6 @@ from falsifier.record.files import CAMPAIGN, is_locked, locked, make_folder, rea
 from falsifier.record.journal import JOURNAL, LOCK, holds_run
 from falsifier.record.manifest import MANIFEST, Surroundings, runs_below
 
-# Time in s to wait for the lock: is_worked_on() holds it for a moment.
-_LOCK_PATIENCE = 0.5
-
 
 class CampaignRecord(Surroundings):
     """Content of campaign.json."""
@@ -97,7 +94,7 @@ def campaign_lock(directory: Path) -> AbstractContextManager[None]:
         f"{directory}: another process is working on this campaign; wait until it ends, or follow it: "
         f"falsifier watch {shell_word(directory)}"
     )
-    return locked(directory / LOCK, busy=busy, patience=_LOCK_PATIENCE)
+    return locked(directory / LOCK, busy=busy)
 
 
 def is_worked_on(directory: Path) -> bool:

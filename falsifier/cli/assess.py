@@ -5,12 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
 from falsifier.analyses.assess import assess as assess_problem
 from falsifier.analyses.margin import margin as find_margin, stated_at
 from falsifier.cli import options
-from falsifier.cli.command import command, refuse
+from falsifier.cli.command import command, refuse, stated
 from falsifier.cli.output import INTERRUPTED, as_shown, conclude
 from falsifier.core.literals import number_in, one_line
 from falsifier.engines import DEFAULT_ENGINE
@@ -140,14 +139,7 @@ def _loaded(given: dict[str, Any], requirement: str | None) -> tuple[Problem, di
                 f"{place}: not a run directory: it contains no {manifest.MANIFEST}; expected a run, a spec, "
                 "an FMU or a bundled name"
             ) from None
-    context = click.get_current_context()
-    changed = [
-        parameter.opts[0]
-        for parameter in context.command.params
-        if parameter.name in given.keys() - {"target"}
-        and context.get_parameter_source(parameter.name) is not ParameterSource.DEFAULT
-    ]
-    if changed:
+    if changed := stated(given.keys() - {"target"}):
         raise click.UsageError(f"{place}: a run's search space cannot be changed; drop {', '.join(changed)}")
     described = manifest.read(place).of(requirement)
     source = described.request.source

@@ -1,11 +1,12 @@
 """Commands: their help in groups, the check of their arguments, and how options are added to them."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import partial
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 Function = Callable[..., Any]
 Decorator = Callable[[Function], Function]
@@ -104,6 +105,17 @@ def add(command: Function, *decorators: Decorator) -> Function:
     for decorate in reversed(decorators):
         command = decorate(command)
     return command
+
+
+def stated(names: Collection[str]) -> list[str]:
+    """Return the options that the current command was given, of those with these names of arguments."""
+    context = click.get_current_context()
+    return [
+        parameter.opts[-1]
+        for parameter in context.command.params
+        if parameter.name in names
+        and context.get_parameter_source(parameter.name) is not ParameterSource.DEFAULT
+    ]
 
 
 def refuse(reason: str, **given: object) -> None:

@@ -2,6 +2,7 @@
 
 from contextlib import closing
 from dataclasses import asdict, replace
+from itertools import chain, count
 from math import isinf
 from pathlib import Path
 from typing import Any
@@ -110,8 +111,8 @@ def _starter(fmus: tuple[Path, ...], path: Path) -> str:
     if len(fmus) > 1:
         parts: dict[str, Path] = {}
         for source in map(one_fmu, fmus):
-            name = source.stem if source.stem not in parts else f"{source.stem}{len(parts) + 1}"
-            parts[name] = source
+            names = chain([source.stem], (f"{source.stem}{i}" for i in count(2)))
+            parts[next(name for name in names if name not in parts)] = source
         info = System(dict(parts), name=path.stem).info
         return starter_spec({name: seen_from(path, source) for name, source in parts.items()}, info)
     given = fmus[0]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from falsifier.cli import llm_options
-from falsifier.cli.command import command, refuse
+from falsifier.cli.command import command, stated
 from falsifier.cli.options import PATH, json_option, problem_source, requirement_options
 from falsifier.cli.output import FAILED, as_shown, conclude, say
 from falsifier.core.words import counted
@@ -66,7 +66,9 @@ def prompt(
     from falsifier.record.records import EvaluatedRecord
 
     if at is not None:
-        refuse("--at prints what a run sent: falsifier llm prompt RUN --at N", after=directory)
+        if stray := stated({"variant", "anonymous", "directory", *options} - {"target"}):
+            why = "--at prints what a run sent: falsifier llm prompt RUN --at N"
+            raise click.UsageError(f"{', '.join(stray)}: {why}")
         say(_sent(Path(options["target"]), at, as_json=as_json))
         return
     problem = load_source(problem_source(options))

@@ -128,6 +128,8 @@ def llm_settings(options: dict[str, Any]) -> "LLMSettings | None":
 
     name, effort = name_and_effort(llm)
     given = dict(map(_name_and_value, pairs))
+    if len(given) < len(pairs):
+        raise click.UsageError("--llm-option: a NAME is given twice; drop one of them")
     passed = {name: _number_or_text(value) for name, value in given.items() if name not in _EXPECTED}
     fields: dict[str, Any] = {name: value for name, value in given.items() if name in _EXPECTED}
     if "price" in fields:

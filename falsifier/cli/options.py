@@ -5,7 +5,7 @@ or add a remark, a function makes the option.
 """
 
 import logging
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -289,11 +289,13 @@ def _total(text: str) -> tuple[str, float]:
 
 
 def _totals(
-    _context: click.Context, _option: click.Parameter, given: Iterable[tuple[str, Any]]
+    _context: click.Context, _option: click.Parameter, given: Collection[tuple[str, Any]]
 ) -> "Budget | None":
     from falsifier.search.budget import Budget
 
-    return Budget(**{"simulations": None, **dict(given)}) if given else None
+    if len(limits := dict(given)) < len(given):
+        raise click.UsageError("--total: a limit is given twice; drop one of them")
+    return Budget(**{"simulations": None, **limits}) if given else None
 
 
 total_option = click.option(

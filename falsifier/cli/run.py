@@ -11,7 +11,7 @@ from falsifier.cli import options
 from falsifier.cli.command import Command, command, refuse
 from falsifier.cli.llm_options import check_context, context_option, llm_options, llm_settings, read_budget
 from falsifier.cli.output import INTERRUPTED, as_shown, conclude
-from falsifier.errors import JournalError
+from falsifier.errors import JournalError, SpecError
 from falsifier.views.terminal import warn
 
 if TYPE_CHECKING:  # imported where used, so that --help prints at once
@@ -165,10 +165,12 @@ def resume(
         for place in places:
             try:
                 results += resume_run(place, budget=budget, listeners=[display])
-            except JournalError as error:  # such as a run whose problem was made in Python
+            except (JournalError, SpecError) as error:  # such as a run whose problem was made in Python
                 if len(places) == 1:
                     raise
                 warn(f"falsifier: {error}; left as it is")
+            if any(result.status == "interrupted" for result in results):
+                break
     if not results:
         raise JournalError(f"{directory}: none of these {len(places)} runs can be continued here")
     _finish(results, as_json=as_json)

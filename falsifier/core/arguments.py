@@ -54,7 +54,9 @@ def path_of(name: str, given: str | PathLike[str], expected: str = "a path") -> 
 
 
 def utf_8(path: str) -> str:
-    """Return a text with a path; SpecError if that is not of UTF-8, in which everything is recorded."""
+    """Return a text with a path; SpecError if it cannot be one, or not in UTF-8, in which all is recorded."""
+    if "\0" in path:
+        raise SpecError(f"{path!r}: no file has the character NUL in its name; correct the path")
     try:
         path.encode()
     except UnicodeEncodeError:

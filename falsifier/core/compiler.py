@@ -36,7 +36,13 @@ def compile_c(what: Path, folder: Path, arguments: Sequence[str]) -> None:
     command = [*compiler(), *arguments]
     try:
         done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, timeout=_TIME_LIMIT_SECONDS, check=False
+            command,
+            cwd=folder,
+            capture_output=True,
+            encoding="utf-8",
+            errors="replace",  # it repeats lines of sources, in whatever encoding they are
+            timeout=_TIME_LIMIT_SECONDS,
+            check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise ModelError(f"{what}: the compiler did not finish ({error})") from error

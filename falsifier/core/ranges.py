@@ -100,7 +100,7 @@ class Range:
         >>> ParameterRange("R", 1e-6, 1e-2, scale="log").at(0.25), ParameterRange("k", 2.0, 4.0).at(0.25)
         (1e-05, 2.5)
         """
-        if self.scale == "log":
+        if self.scale == "log" and self.low < self.high:
             return self.low ** (1.0 - share) * self.high**share  # exact at both ends
         return self.low + (self.high - self.low) * share
 

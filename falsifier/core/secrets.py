@@ -177,7 +177,8 @@ def line_of_secret(text: str) -> int | None:
     """
     folded = text.casefold()
     hints = [hint for hint in _HINTS if hint in folded]
-    for number, line in enumerate(text.splitlines() if hints else (), start=1):
+    # Lines as editors number them, not those of splitlines, which form feeds and others end as well.
+    for number, line in enumerate(re.split("\r\n?|\n", text) if hints else (), start=1):
         folded = line.casefold()
         if any(hint in folded for hint in hints) and (
             any(pattern.search(line) for pattern in _UNNAMED) or _ENVIRONMENT.match(line)
@@ -187,12 +188,10 @@ def line_of_secret(text: str) -> int | None:
 
 
 def line_of_held_secret(text: str) -> int | None:
-    """Return the number of the first line, from 1, with a secret of this process's environment, or None."""
-    held = [value for v in _held() if len(value := v.strip()) >= _SHORTEST and value in text]
-    for number, line in enumerate(text.splitlines() if held else (), start=1):
-        if any(value in line for value in held):
-            return number
-    return None
+    """Return the first line, from 1, on which a secret of this process's environment begins, or None."""
+    places = [text.find(value) for v in _held() if len(value := v.strip()) >= _SHORTEST]
+    first = min((at for at in places if at >= 0), default=None)
+    return None if first is None else text.count("\n", 0, first) + 1
 
 
 def scrubbed(environment: Mapping[str, str]) -> dict[str, str]:

@@ -55,9 +55,9 @@ class Signal:
             is_finite = all(map(isfinite, (*self.times, *self.values)))
         except (TypeError, OverflowError):
             raise SpecError("control-point times and values: expected sequences of numbers") from None
-        for name in ("times", "values"):  # lists and arrays neither compare nor hash
-            if not isinstance(getattr(self, name), tuple):
-                object.__setattr__(self, name, tuple(map(float, getattr(self, name))))
+        # Lists neither compare nor hash, whole numbers make arrays of integers, JSON has no numbers of numpy.
+        for name in ("times", "values"):
+            object.__setattr__(self, name, tuple(map(float, getattr(self, name))))
         if len(self.times) != len(self.values) or not self.times:
             raise SpecError(
                 f"{len(self.times)} times and {len(self.values)} values: expected equally many, one or more"

@@ -16,7 +16,7 @@ from falsifier.core.files import bundled, file_name
 from falsifier.counterexamples import store
 from falsifier.counterexamples.shrink import shrink
 from falsifier.counterexamples.store import Replayed, StoredCounterexample
-from falsifier.errors import SimulationError, refusal
+from falsifier.errors import FalsifierError, SimulationError, refusal
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.problem.loading import source_file
 from falsifier.problem.problem import Problem
@@ -119,6 +119,9 @@ def check(
 def _smallest(found: Confirmation, spent: Spent, budget: Budget | int) -> Confirmation:
     """The shrunk counterexample if it is confirmed, otherwise the original."""
     limit = budget.simulations if isinstance(budget, Budget) else budget
-    shrunk = shrink(found.problem, found.evaluation, budget=limit or 2 * spent.simulations)
+    try:
+        shrunk = shrink(found.problem, found.evaluation, budget=limit or 2 * spent.simulations)
+    except FalsifierError:  # this time, its simulation fails
+        return found
     again = confirm(found.problem, shrunk.evaluation)
     return again if again.outcome == "confirmed" else found

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.arguments import whole
 from falsifier.core.candidate import Candidate
-from falsifier.core.ranges import Scale
+from falsifier.core.ranges import Scale, nearest_numbers
 from falsifier.core.words import counted, listed, readable, with_unit
 from falsifier.counterexamples.shrink import sampled_stretches, with_parameter, with_signal, with_stretch
 from falsifier.errors import SpecError, setting
@@ -70,7 +70,7 @@ class RobustnessMap:
 
     Attributes:
         original: robustness of the counterexample; not negative for a near miss.
-        coordinates: the values that are changed; no whole numbers that the radius leaves as they are.
+        coordinates: the values that are changed; none that the radius leaves as they are.
         radius: largest change as a share of the range.
         values: values of the coordinates, shape (samples, coordinates).
         sizes: size of each sample's change as a share of the range, shape (samples,).
@@ -123,7 +123,7 @@ class RobustnessMap:
             return f"of {changes} of {names} at once, {shares}. {self._followed}"
         tried = f"{changes} of up to {_percent(self.persistence[-1][0])} of the range"
         violating = int((self.robustness < 0).sum())
-        found = f"none of {tried} violates" if not violating else f"{violating} of {tried} violate"
+        found = f"{violating or 'none'} of {tried} violate{'s' if violating < 2 else ''}"
         least = "" if self.smallest is None else f"; the smallest robustness is {signed(self.smallest)}"
         return f"{found}{least}, without a change it is {signed(self.original)}. {self._followed}"
 
@@ -136,8 +136,9 @@ class RobustnessMap:
         end += " Stopped by the user." if self.interrupted else ""
         if known.size and (known == self.original).all():
             return f"None of these changes moved the robustness.{end}"
-        most = [f"{self.coordinates[i].label} ({self.influences[i]:+.2f})" for i in self.axes]
-        named = f"most with {listed(most)}" if any(self.influences) else "with none of these values"
+        told = [(self.coordinates[i].label, f"{self.influences[i]:+.2f}") for i in self.axes]
+        most = [f"{label} ({number})" for label, number in told if float(number)]
+        named = f"most with {listed(most)}" if most else "with none of these values"
         return f"Over these changes the robustness correlates {named} (rank correlation).{end}"
 
 
@@ -167,11 +168,14 @@ def robustness_map(
     from scipy.stats.qmc import Sobol
 
     candidate = evaluation.candidate
-    discrete = {r.name: radius * (r.high - r.low) for r in problem.space.ranges if r.kind != "real"}
-    found = _coordinates(problem, candidate)
-    coordinates = tuple(c for c in found if discrete.get(c.name, 1.0) >= 1 - _ROUNDING)
+    discrete = {r.name: r for r in problem.space.ranges if r.kind != "real"}
+    coordinates = tuple(
+        c
+        for c in _coordinates(problem, candidate)
+        if c.low < c.high and (c.name not in discrete or radius * (c.high - c.low) >= 1 - _ROUNDING)
+    )
     if not coordinates:
-        change = f"{_percent(radius)} of the range of a whole number is no change"
+        change = f"{_percent(radius)} of a range changes none of the values"
         raise SpecError(f"{problem.name}: {change}; in Python, robustness_map accepts a larger radius")
     start, low, high = np.array([(c.value, c.low, c.high) for c in coordinates]).T
     logs = np.array([c.scale == "log" for c in coordinates])
@@ -184,7 +188,9 @@ def robustness_map(
     shell = np.array(_SHELLS)[shells, np.newaxis] * reach
     below, above = np.maximum(start - shell, low), np.minimum(start + shell, high)
     values = below + unit * (above - below)
-    values[:, is_whole] = np.rint(values[:, is_whole])
+    for k in np.flatnonzero(is_whole):
+        near = nearest_numbers(discrete[coordinates[k].name], values[:, k])
+        values[:, k] = np.where(np.abs(near - start[k]) <= reach[k], near, start[k])
     changed = (values != start).any(axis=1)
     values, shells, samples = values[changed], shells[changed], int(changed.sum())
     if not samples:

@@ -16,12 +16,13 @@ from falsifier.core.arguments import finite, whole
 from falsifier.core.candidate import Candidate
 from falsifier.core.ranges import InputRange
 from falsifier.core.signals import Interpolation, Signal
+from falsifier.core.words import readable, resolving
 from falsifier.counterexamples.simplicity import rest_value, rounder, simplicity
 from falsifier.errors import CandidateError, SpecError, setting
 from falsifier.evaluation.confirm import half_step
 from falsifier.evaluation.evaluate import Evaluation, check_evaluation, evaluate
 from falsifier.problem.problem import Problem
-from falsifier.stl.margins import signed
+from falsifier.stl.margins import shown
 
 Pass = Callable[[Problem, Candidate], Iterator[Candidate]]
 SignalPass = Callable[[Problem, InputRange, Signal], Iterator[Signal]]
@@ -94,10 +95,9 @@ def shrink(
     share = KEPT_SHARE if start.violated else 1 + GIVEN_SHARE
     hunt.at_most = share * start.robustness if at_most is None else at_most
     if hunt.kept(start.candidate) is None:
-        raise SpecError(
-            f"nothing to shrink: the robustness of {problem.name} is {signed(start.robustness)}, more than "
-            f"{hunt.at_most:g}"
-        )
+        digits = resolving(start.robustness, start.robustness - hunt.at_most)
+        found, most = (readable(shown(r), digits, "+") for r in (start.robustness, hunt.at_most))
+        raise SpecError(f"nothing to shrink: the robustness of {problem.name} is {found}, more than {most}")
     if start.violated:
         with suppress(_BudgetUsedUpError):
             hunt.demands_half_step = hunt.violates_at_half_step(start.candidate)

@@ -69,7 +69,7 @@ def rounder(value: float) -> Iterator[float]:
     >>> list(rounder(33.25))[:4]
     [30.0, 40.0, 33.0, 34.0]
     """
-    exact = Decimal(repr(value))
+    exact = Decimal(repr(float(value)))  # numpy's numbers have another one
     seen = {value}
     for count in range(1, digits(value)):
         last_place = Decimal((0, (1,), exact.adjusted() - count + 1))

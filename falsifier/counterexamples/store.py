@@ -48,11 +48,12 @@ SHRUNK = "shrunk.json"
 
 ReplayStatus = Literal["violates", "fragile", "does not violate", "does not fit"]
 
-# Of a confirmation's outcome: the status, and what is said of it.
-_STATUS: dict[Outcome, tuple[ReplayStatus, str]] = {
+# Of a confirmation's outcome, None if nothing was violated: the status, and what is said of it.
+_STATUS: dict[Outcome | None, tuple[ReplayStatus, str]] = {
     "confirmed": ("violates", "still violated"),
     "fragile": ("fragile", "fragile"),
-    "refuted": ("does not violate", "no longer violated"),
+    "refuted": ("does not violate", "violated, which is not confirmed any more"),
+    None: ("does not violate", "no longer violated"),
 }
 
 
@@ -96,7 +97,7 @@ class Replayed:
     Attributes:
         status: ``violates`` (confirmed), ``fragile`` (only at the given communication step),
             ``does not violate``, or ``does not fit``: the problem has other inputs, ranges or control points.
-        confirmation: confirmation of the new simulation; None if it does not violate.
+        confirmation: confirmation of the new simulation, also a refuted one; None if that does not violate.
         evaluation: the new simulation; None if the counterexample does not fit.
         text: the result in words, including what has changed since the counterexample was stored.
     """
@@ -293,7 +294,7 @@ def replay(stored: StoredCounterexample, problem: Problem) -> Replayed:
     if evaluation.robustness is None:
         raise SimulationError(f"{problem.name}: the simulation {evaluation.outcome}")
     confirmation = confirm(problem, evaluation) if evaluation.violated else None
-    status, said = _STATUS[confirmation.outcome if confirmation else "refuted"]
+    status, said = _STATUS[confirmation.outcome if confirmation else None]
     breach = evaluation.verdict.breach if evaluation.verdict else None
     broke = f": {breach.text};" if breach else ","
     text = (

@@ -245,6 +245,8 @@ def _joined(source: ProblemSource, *, searches: bool) -> Problem:
         fmu = Path(source.target)
         if stated is None and fmu.is_file():
             raise SpecError(f"{fmu}: no requirement; {_stating(str(fmu))}")
+        if source.profile is not None:
+            raise SpecError(f"{fmu}: an FMU has no profile {source.profile!r}: only specs have profiles")
         joined = join_formula(
             fmu,
             stated or RequirementSection(formula=""),
@@ -300,24 +302,28 @@ def _python_problem(source: ProblemSource) -> Problem:
         cure = "; in the folder of MODULE.py, start the command line with python -m falsifier"
         cure = cure if isinstance(error, ModuleNotFoundError) and error.name == module else ""
         raise SpecError(
-            f"{target}: expected python:MODULE:NAME that can be imported: {error}{cure}"
+            f"{target}: expected python:MODULE:NAME that can be imported: {error}{_place(error)}{cure}"
         ) from None
-    except Exception as error:  # whatever the user's module does
+    except (Exception, SystemExit) as error:  # whatever the user's module does
         raise SpecError(_raised(f"{target}: importing {module}", error)) from error
     try:
         problem = found() if callable(found) else found
     except FalsifierError:
         raise
-    except Exception as error:  # whatever the user's function does
+    except (Exception, SystemExit) as error:  # whatever the user's function does
         raise SpecError(_raised(f"{target}: {name}()", error)) from error
     if not isinstance(problem, Problem):
         raise SpecError(f"{target}: expected a Problem or a function that returns one")
     return problem
 
 
-def _raised(what: str, error: Exception) -> str:
+def _raised(what: str, error: BaseException) -> str:
     """Say what a user's code raised, and where."""
-    theirs = extract_tb(error.__traceback__)[1:]
-    where = f" ({theirs[-1].filename}, line {theirs[-1].lineno})" if theirs else ""
-    said = one_line(f"{type(error).__name__}: {error}")
-    return f"{what} raised {said}{where}; expected a Problem or a function without arguments that returns one"
+    said = one_line(f"{type(error).__name__}: {error}") + _place(error)
+    return f"{what} raised {said}; expected a Problem or a function without arguments that returns one"
+
+
+def _place(error: BaseException) -> str:
+    """Return where a user's code raised an error, in brackets; empty if it was not their code."""
+    theirs = [each for each in extract_tb(error.__traceback__)[1:] if "importlib" not in each.filename]
+    return f" ({theirs[-1].filename}, line {theirs[-1].lineno})" if theirs else ""

@@ -201,7 +201,7 @@ class Simulation(Section):
 class ModelSection(Simulation):
     """What is simulated and how."""
 
-    fmu: str | None = Field(
+    fmu: Recordable | None = Field(
         None,
         description="Path of the FMU or SSP package, relative to the spec file; or see [components.NAME]",
     )
@@ -211,7 +211,7 @@ class ModelSection(Simulation):
 class ComponentSection(Section):
     """One FMU of a system."""
 
-    fmu: str = Field(description="Path of the FMU, relative to the spec file.")
+    fmu: Recordable = Field(description="Path of the FMU, relative to the spec file.")
     step: Seconds | None = Field(
         None, description="Its own step in s, an integer multiple of the communication step."
     )
@@ -266,7 +266,7 @@ class CouplingSection(Section):
 class ContextSection(Section):
     """What a language model, and the engine surrogate, may read about the model; nothing else is sent."""
 
-    files: tuple[str, ...] = Field(
+    files: tuple[Recordable, ...] = Field(
         (), description="Simulink files, sources and documents, relative to the spec file."
     )
     fmu: Truth = Field(default=False, description="Also documentation, sources and texts inside the FMU.")

@@ -84,8 +84,8 @@ def changes_from(
     except ValidationError as error:
         key, message = first_fault(error)
         kind, name = (*error.errors()[0]["loc"], "")[:2]
-        if kind in data:
-            searched = kind == "inputs" or (kind == "parameters" and "range" in data[kind].get(name, ()))
+        if kind in ("inputs", "parameters"):
+            searched = kind == "inputs" or "range" in data[kind].get(name, ())
             key = written(stated_as(str(kind), str(name), searched=searched), key)
         else:
             key = setting(key)

@@ -31,6 +31,7 @@ NAME_IN_LINES = "expected a name of one line without control characters and invi
 # Limits of a spec file: the time to read nested keys grows with the square of their depth.
 _MAX_LENGTH = 1_000_000
 _MAX_KEY_PARTS = 500
+_KEY = re.compile(r"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)++""")
 # How files begin that Windows programs, such as PowerShell's >, write in UTF-16.
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 # What an error of TOML, with what stands at its place and the whole line below, contains, and what to write
@@ -126,7 +127,7 @@ def read_spec(path: Path) -> Spec:
         text = _text_of(path)
         if len(text) > _MAX_LENGTH:
             raise SpecError(f"has {len(text):,} characters, more than {_MAX_LENGTH:,}")
-        if any(line.partition("=")[0].count(".") > _MAX_KEY_PARTS for line in text.splitlines()):
+        if any(key[0].count(".") > _MAX_KEY_PARTS for key in _KEY.finditer(text)):
             raise SpecError(f"has a key of more than {_MAX_KEY_PARTS} parts")
         try:
             data = tomllib.loads(text)

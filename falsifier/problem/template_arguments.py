@@ -5,14 +5,12 @@ from typing import Annotated, ClassVar, Literal, NamedTuple
 
 from pydantic import AfterValidator, BeforeValidator, Field
 
+from falsifier.core.experiment import GRID_ROUNDING, exact
 from falsifier.core.literals import number_in, shortest
 from falsifier.errors import FormulaError, SpecError
 from falsifier.problem.sections import ModelChanges, Number, no_truth
 from falsifier.stl import expression, parse
 from falsifier.stl.formula import Predicate
-
-# Decimals of times in s; finer than any grid.
-_DECIMALS = 9
 
 
 class Clock(NamedTuple):
@@ -89,9 +87,14 @@ def tidy(value: float) -> float:
     return float(f"{value:.12g}")
 
 
+def total(*seconds: float) -> float:
+    """Return the sum of times in s without the digits of rounding, 0.3 for 0.1 + 0.2."""
+    return float(sum(map(exact, seconds)))
+
+
 def window(start: float, end: float) -> str:
     """Return a window without the digits of rounding."""
-    return f"[{shortest(round(start, _DECIMALS))},{shortest(round(end, _DECIMALS))}]"
+    return f"[{shortest(total(start))},{shortest(total(end))}]"
 
 
 def size_of(margin: float | str, reference: str | float) -> str:
@@ -176,7 +179,7 @@ class Template(ModelChanges):
             return self._each_time(after, f"{operator}{window(begins, lasts)} ({body})", clock)
         if self.during is not None:
             raise SpecError("applies only if after is a condition; state the time in after", key="during")
-        start, end = after + begins, clock.stop_time if lasts is None else after + lasts
+        start, end = total(after, begins), clock.stop_time if lasts is None else total(after, lasts)
         if max(start, end) > clock.stop_time:
             raise _too_long(max(start, end), clock)
         return f"{operator}{window(start, end)} ({body})"
@@ -184,9 +187,9 @@ class Template(ModelChanges):
     def _span(self, body: str, clock: Clock) -> tuple[float, float]:
         """Return when it applies, in s: the given window, or as long as the simulation allows."""
         reach = parse(body).horizon(clock.step)
-        latest = clock.stop_time - reach
+        latest = total(clock.stop_time, -reach)
         if clock.step:
-            latest = floor(latest / clock.step + 1e-6) * clock.step
+            latest = float(floor(latest / clock.step + GRID_ROUNDING) * exact(clock.step))
         if self.during is None:
             if latest < 0:
                 raise _too_long(reach, clock)

@@ -35,6 +35,7 @@ from falsifier.problem.template_arguments import (
     share_of,
     size_of,
     tidy,
+    total,
     window,
 )
 from falsifier.stl import parse
@@ -64,7 +65,7 @@ class Settles(Template):
 
     def _formula(self, clock: Clock) -> str:
         inside = near(self.signal, self.reference, self.within)
-        lasts = None if self.stays is None else self.time + self.stays
+        lasts = None if self.stays is None else total(self.time, self.stays)
         return self._from(self.after, clock, "G", inside, lasts=lasts, key="stays", begins=self.time)
 
 
@@ -266,7 +267,7 @@ class Order(Template):
 
     def _formula(self, clock: Clock) -> str:
         start, end = self._span(" and ".join(f"({c})" for c in self.conditions), clock)
-        rest = window(0.0, end - start)
+        rest = window(0.0, total(end, -start))
         every = " and ".join(f"not (not ({a}) U{rest} ({b}))" for a, b in pairwise(self.conditions))
         return every if start == 0 else f"G{window(start, start)} ({every})"
 

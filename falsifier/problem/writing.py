@@ -165,7 +165,7 @@ def _requirement(info: ModelInfo, stop_time: float) -> str:
         more = ", ..." if len(candidates) > _SHOWN_VARIABLES else ""
         lines.append(_comment(f"The FMU has no outputs. Requirements may name any variable: {shown}{more}"))
     # Nothing may be searched, or found to hold, before somebody has said what is required.
-    formula = f"G[0,{stop_time:.10g}] ({name_text(candidates[0].name)} <= {PLACEHOLDER})"
+    formula = f"G[0,{shortest(stop_time)}] ({name_text(candidates[0].name)} <= {PLACEHOLDER})"
     lines.append(
         _noted(f"formula = {_formula_item(formula).as_string()}", "replace with the real requirement")
     )

@@ -27,6 +27,9 @@ CAMPAIGN = "campaign.json"
 # Names of files that are complete.
 TRAJECTORY_NAMES = r"\d+-[0-9a-f]+\.npz"
 
+# Time in s for which a lock is waited for in any case.
+_MOMENT = 0.3
+
 # Errors of the operating system that say that a path can never be a folder.
 _NO_FOLDER = frozenset({errno.EEXIST, errno.ENOENT, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP})
 
@@ -63,14 +66,15 @@ def read_sealed(path: Path, kind: type[Content], *, what: str) -> Content:
 def locked(path: Path, *, busy: str, patience: float = 0.0) -> Iterator[None]:
     """Hold a lock file; that of a killed process is released by the system.
 
-    Another process is waited for, ``patience`` s at most; ``busy`` is what to say if it still holds the file.
+    Another process is waited for, ``patience`` s at most, or a moment, as is_locked() takes one; ``busy`` is
+    what to say if it still holds the file.
 
     Raises:
         JournalError: if another process still holds it after that time.
         MachineError: if the file system has no locks.
     """
     # The package filelock would fall back to files without locks, which a second process removes.
-    until = monotonic() + patience
+    until = monotonic() + max(patience, _MOMENT)
     while (held := lock_file(path, 0o666)) is None:
         if monotonic() > until:
             raise JournalError(busy)

@@ -254,14 +254,20 @@ class JournalReader:
         self.path = directory / JOURNAL
         self.offset = 0
         self.line = 0
-        # Numbers of candidates and of evaluations so far.
+        # Numbers of candidates and of evaluations so far, and the requirements that were falsified.
         self._asked = self._evaluated = 0
+        self._falsified: set[str] = set()
 
     @cached_property
-    def run(self) -> str | None:
-        """Name of the run, which every line repeats; None without a manifest, which precedes lines."""
+    def _described(self) -> manifest.Manifest | None:
+        """What the run was started with; None without a manifest, which precedes lines."""
         directory = self.path.parent
-        return manifest.read(directory).run if holds_run(directory) else None
+        return manifest.read(directory) if holds_run(directory) else None
+
+    @property
+    def run(self) -> str | None:
+        """Name of the run, which every line repeats; None without a manifest."""
+        return None if self._described is None else self._described.run
 
     @property
     def shrank(self) -> bool:
@@ -282,6 +288,7 @@ class JournalReader:
                     check_seal(line)
                     record = parse_line(line, number, self.run)
                     self._count(record)
+                    self._check_names(record)
                 except ValueError as error:
                     raise JournalError(
                         f"{self.path}: line {number} is damaged: {error}; to drop what is damaged: "
@@ -297,10 +304,27 @@ class JournalReader:
                 self._asked += len(record.candidates)
             case EvaluatedRecord() if record.index == self._evaluated < self._asked:
                 self._evaluated += 1
-            case ConfirmedRecord() if not 0 <= record.index < self._evaluated:
-                raise ValueError(f"simulation {record.index}, which it confirms, is not recorded before it")
+            case ConfirmedRecord() if record.index != self._evaluated - 1:
+                raise ValueError(f"simulation {record.index}, which it confirms, is not the last before it")
             case AskedRecord() | EvaluatedRecord():
                 raise ValueError("the candidates or simulations before those that it is about are missing")
+
+    def _check_names(self, record: Record) -> None:
+        """Check what a record names, which others look up; ValueError if the manifest names other things."""
+        if (described := self._described) is None:
+            return
+        names, is_known = set(described.names), True
+        match record:
+            case AskedRecord():
+                searched = [{r.name for r in ranges} for ranges in (described.inputs, described.parameters)]
+                is_known = all([{*c.signals}, {*c.parameters}] == searched for c in record.candidates)
+            case EvaluatedRecord():
+                is_known = names - self._falsified <= record.verdicts.keys() <= names
+            case ConfirmedRecord():
+                is_known = record.requirement in names
+                self._falsified |= {record.requirement} if record.outcome == "confirmed" else set()
+        if not is_known:
+            raise ValueError("its inputs, parameters or requirements are others than those in manifest.json")
 
 
 def recorded_candidates(records: Iterable[Record]) -> dict[int, Candidate]:

@@ -108,7 +108,7 @@ class Manifest(Surroundings):
         (), description="Internal variables that were recorded for the engine beside those of the problem."
     )
     modes: tuple[ModeRecord, ...] = Field(description="Recorded integers, Booleans and enumerations.")
-    stop_time: float = Field(description="End of each simulation in s.")
+    stop_time: float = Field(gt=0, description="End of each simulation in s.")
     allow: tuple[str, ...] = Field((), description="What the FMU was allowed beyond its own folders.")
     deny: tuple[str, ...] = Field((), description="What it was denied.")
     hashes: dict[str, str] = Field(description="SHA-256 of the FMUs and the spec or module, by path.")

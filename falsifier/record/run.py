@@ -30,7 +30,7 @@ from falsifier.record.journal import JOURNAL, STOP, check_new, holds_run, open_j
 from falsifier.record.records import EndedRecord
 from falsifier.record.replay import replayed
 from falsifier.search.budget import Budget, budget_of
-from falsifier.search.events import Evaluated, Event, Listener
+from falsifier.search.events import Evaluated, Event, Listener, RunStarted
 from falsifier.search.loop import search
 from falsifier.search.make_engines import check_llm, make_engines, note_llm, told_problems
 from falsifier.search.parameterization import engine_parameterization
@@ -159,6 +159,8 @@ def falsify(
         place = base / file_name(group[0].name) if base is not None and len(groups) > 1 else base
         found = carry_out(request, group, place, engine=made, chat=chat, listeners=listeners)
         results |= {result.problem.name: result for result in found}
+        if any(result.status == "interrupted" for result in found):
+            listeners = (*listeners, _interrupt)  # the others only begin, so that all of it can be resumed
     ordered = [results[each.name] for each in problems]
     return ordered[0] if listed is None else ordered
 
@@ -184,7 +186,7 @@ def resume(
         listeners: called with every event.
 
     Returns:
-        One result per requirement.
+        One result per requirement; of a folder, not of the runs after one that was interrupted.
 
     Raises:
         JournalError: if the directory contains no run, or the FMU, the spec or the problem has changed.
@@ -196,11 +198,14 @@ def resume(
     places = runs_in(directory)
     by_name = {problem.name: problem for problem in problems}
     results: list[Result] = []
-    for place in places:
-        described = manifest.read(place)
-        request = described.request
-        if budget is not None:
-            request = request.model_copy(update={"budget": _changed(request.budget, budget, place)})
+    found = [manifest.read(place) for place in places]
+    limits = [d.request.budget for d in found]
+    if budget is not None:  # of all, before any is continued
+        limits = [_changed(old, budget, place) for old, place in zip(limits, places, strict=True)]
+    for place, described, limit in zip(places, found, limits, strict=True):
+        if any(result.status == "interrupted" for result in results):
+            break
+        request = described.request.model_copy(update={"budget": limit})
         if engine is None and request.llm is None and described.engine not in ENGINES:
             raise JournalError(f"{place}: its engine was made in Python: call resume() with engine=...")
         if engine is not None and engine.name != described.engine:
@@ -232,6 +237,12 @@ def runs_in(directory: Path) -> list[Path]:
     if any(hashes != known[0] for hashes in known):
         manifest.check_no_folder(directory)
     return found or [directory]
+
+
+def _interrupt(event: Event) -> None:
+    """Interrupt a run at its beginning, as Ctrl-C did with the one before."""
+    if isinstance(event, RunStarted):
+        raise KeyboardInterrupt
 
 
 class StopFile:

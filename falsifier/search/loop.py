@@ -280,7 +280,7 @@ class _Loop:
             # Also against the one whose engine proposed it, because a resumed run needs that verdict.
             judges = standing if asked in standing else [asked, *standing]
             judged = [(s, evaluation if s is asked else judge(s.problem, evaluation)) for s in judges]
-            improved = [state.note(seen) for state, seen in judged]
+            improved = [state.note(seen) for state, seen in judged if state.counterexample is None]
             failed = all(seen.status != "ok" for _, seen in judged)
             self.last_error = evaluation.reason if failed else self.last_error
             self.spent = self.clock() + Spent(

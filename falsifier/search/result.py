@@ -2,13 +2,14 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
-from falsifier.core.words import readable
+from falsifier.core.words import readable, resolving
 from falsifier.engines.protocol import Engine, HasRemarks
 from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
@@ -173,7 +174,7 @@ def evaluation_columns(evaluations: Sequence[Evaluation]) -> Columns:
     Returns:
         ``simulation`` (from 1), ``status``, ``robustness`` and ``critical_time`` in s (None without a
         verdict), ``reason`` why there is none, ``seconds`` in the simulator, ``origin`` of the candidate;
-        then inputs and parameters.
+        then inputs and parameters, with ``(varied)`` after a name that is one of these.
     """
     columns: Columns = {
         "simulation": list(range(1, len(evaluations) + 1)),
@@ -184,11 +185,12 @@ def evaluation_columns(evaluations: Sequence[Evaluation]) -> Columns:
         "seconds": [e.seconds for e in evaluations],
         "origin": [e.candidate.origin for e in evaluations],
     }
+    varied: Columns = {}
     for name in _names(e.candidate.signals for e in evaluations):
-        columns |= _signal_columns(name, [e.candidate.signals.get(name) for e in evaluations])
+        varied |= _signal_columns(name, [e.candidate.signals.get(name) for e in evaluations])
     for name in _names(e.candidate.parameters for e in evaluations):
-        columns[name] = [e.candidate.parameters.get(name) for e in evaluations]
-    return columns
+        varied[name] = [e.candidate.parameters.get(name) for e in evaluations]
+    return columns | {f"{n} (varied)" if n in columns else n: column for n, column in varied.items()}
 
 
 def frame(columns: Columns) -> "pandas.DataFrame":
@@ -212,7 +214,9 @@ def _signal_columns(name: str, signals: Sequence[Signal | None]) -> Columns:
     if len(shapes) > 1:
         return {name: [None if signal is None else _text(signal) for signal in signals]}
     ((shared, _),) = shapes
-    labels = [name] if len(shared) == 1 else [f"{name} @ {readable(time)} s" for time in shared]
+    gap = min((b - a for a, b in pairwise(shared)), default=0.0)
+    times = [readable(time, resolving(time, gap)) for time in shared]
+    labels = [name] if len(shared) == 1 else [f"{name} @ {time} s" for time in times]
     return {
         label: [None if signal is None else signal.values[i] for signal in signals]
         for i, label in enumerate(labels)

@@ -251,13 +251,15 @@ class Effects:
         signals = problem.requirement.formula.signals
         self._signals = [s for s in signals if s not in self._names or s in problem.info.starts]
         self._judged = [name for name in self._names if name not in problem.requirement.formula.signals]
+        # Each signal and value gets a number: Python's hashes of -1 and -2 are the same.
+        self._numbers: dict[object, int] = {}
         # By name and the hash of everything else: what was simulated, and what came of it.
         self._seen: dict[tuple[str, int], tuple[set[int], set[int]]] = {}
 
     def see(self, candidate: Candidate, trajectory: Trajectory) -> None:
         """Add a simulation."""
-        varied = {**candidate.signals, **candidate.parameters}
-        parts = {name: hash(varied[name]) for name in self._names}
+        varied, known = {**candidate.signals, **candidate.parameters}, self._numbers
+        parts = {name: known.setdefault(varied[name], len(known)) for name in self._names}
         outcome = hash(tuple(trajectory[name].tobytes() for name in self._signals))
         for name in self._judged:
             rest = hash(tuple((other, part) for other, part in parts.items() if other != name))

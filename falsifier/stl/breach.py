@@ -324,7 +324,8 @@ class _Search:
     def _held(self, condition: _Demand, sample: int, *, now: bool = False) -> str:
         """Say that a condition held, with its signals' values; ``now``: where the shortfall was."""
         names, at, read = condition.formula.signals, seconds(self._time(sample)), ""
-        if len(names) <= _MOST_SIGNALS and not condition.formula.horizon(self.trajectory.step):
+        is_now = not any(isinstance(f, stl.Next | stl.Temporal) for f in condition.formula.walk())
+        if len(names) <= _MOST_SIGNALS and is_now:
             values, units = self.trajectory.at(self._time(sample)), self.trajectory.units
             read = ", ".join(
                 in_unit(f"{name_text(n)} = {readable(values[n])}", units.get(n, "")) for n in names

@@ -69,6 +69,8 @@ class _Compiler:
     step: float
     samples: int
     needs: dict[stl.Node, tuple[int, int]] = field(default_factory=dict)
+    # The same in each place where a part stands: samples between them do not matter.
+    spans: dict[stl.Node, set[tuple[int, int]]] = field(default_factory=dict)
     locations: dict[stl.Node, Location] = field(default_factory=dict)
     steps: list[op.Operation] = field(default_factory=list)
     checked: dict[int, tuple[stl.Predicate, Location]] = field(default_factory=dict)
@@ -82,6 +84,7 @@ class _Compiler:
             self._fail_past_end(node, last)
         seen = self.needs.get(node, (first, last))
         self.needs[node] = (min(seen[0], first), max(seen[1], last))
+        self.spans.setdefault(node, set()).add((first, last))
         for part, begin, end in self._below(node, first, last):
             self.demand(part, begin, end)
 
@@ -187,7 +190,11 @@ class _Compiler:
         if node.operator == "==":
             margin = self._emit(_NEGATION, first, last, margin)
         self.checked[len(self.steps)] = node, margin
-        self.steps.append(op.checking(slice(margin.at(first), margin.at(last + 1)), on_limit(node.operator)))
+        idle = np.ones(last + 1 - first, np.bool_)
+        for begin, end in self.spans[node]:
+            idle[begin - first : end + 1 - first] = False
+        margins = slice(margin.at(first), margin.at(last + 1))
+        self.steps.append(op.checking(margins, on_limit(node.operator), idle))
         return margin
 
     def _formula(self, node: stl.Formula, first: int, last: int) -> Location:

@@ -38,13 +38,19 @@ def calculating(function: Function, out: slice, *operands: slice) -> Operation:
     return (constant, unary, binary)[len(operands)]
 
 
-def checking(margins: slice, at_zero: float) -> Operation:
-    """Return the step that stops unless margins are finite; where one is 0, it becomes another number."""
+def checking(margins: slice, at_zero: float, idle: NDArray[np.bool_]) -> Operation:
+    """Return the step that stops unless margins are finite; where one is 0, it becomes another number.
+
+    Those that are idle do not matter: what is not finite there becomes any number.
+    """
 
     def step(x: Floats) -> bool:
         found = x[margins]
         if not found.all():
             found[found == 0.0] = at_zero
+        if np.isfinite(found).all():
+            return False
+        found[idle] = at_zero
         return not np.isfinite(found).all()
 
     return step
@@ -210,9 +216,9 @@ def fill_many(program: Program, columns: Mapping[str, Floats]) -> Floats:
             raise MonitorError(f"no signal {name!r} in the batch; {did_you_mean(name, columns)}")
     used = [np.asarray(columns[name], dtype=np.float64) for name in program.signals]
     shapes = {np.shape(column) for column in columns.values()}
-    count = len(next(iter(columns.values()))) if columns else 0
-    if shapes != {(count, program.samples)}:
+    if len(shapes) != 1 or {shape[1:] for shape in shapes} != {(program.samples,)}:
         raise MonitorError(f"expected columns of shape (m, {program.samples}), got {sorted(shapes)}")
+    ((count, _),) = shapes
     buffer = np.empty((program.size, count))
     n = program.samples
     for i, column in enumerate(used):

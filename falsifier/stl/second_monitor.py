@@ -33,19 +33,27 @@ from falsifier.stl.compiler import window_samples
 from falsifier.stl.expression import Expression, Number
 from falsifier.stl.margins import ON_LIMIT
 
+# Larger than any margin.
+_STAND_IN = 1e308
+
 
 def robustness(formula: stl.Formula, trajectory: Trajectory) -> float:
     """Return the robustness at time 0 computed by rtamt; exactly on the limit, its sign says what is true.
 
     Raises:
         FormulaError: if the bound of a window is not a multiple of the trajectory's step.
-        MonitorError: if the trajectory is too short, not finite or lacks a signal, or rtamt fails.
+        MonitorError: if the trajectory is too short or lacks a signal, a comparison has no finite value at a
+            time at which it matters, or rtamt fails.
     """
     end, needed = float(trajectory.times[-1]), formula.horizon(trajectory.step)
     # In samples, as each bound may be off its sample by a little, and their sum by more.
     if round(needed / (trajectory.step or 1.0)) >= len(trajectory):
         raise MonitorError(f"the formula needs {needed:.10g} s, the trajectory ends at {end:.10g} s")
-    found = _evaluate(formula, _Translation(trajectory))
+    translation = _Translation(trajectory)
+    found = _evaluate(formula, translation)
+    # rtamt needs a margin at all times: where there is none, it must not matter which one it gets.
+    if translation.undefined and found != _evaluate(formula, _Translation(trajectory, stand_in=-_STAND_IN)):
+        raise MonitorError(translation.undefined)
     if found == 0:  # on the limit, it depends on the comparisons: rtamt evaluates their truth, 1 or -1
         return copysign(ON_LIMIT, _evaluate(formula, _Translation(trajectory, of_truth=True)))
     return found
@@ -57,6 +65,8 @@ class _Translation:
 
     trajectory: Trajectory
     of_truth: bool = False
+    stand_in: float = _STAND_IN  # for margins that are not finite
+    undefined: str = ""  # which one is not, and when, in words
     columns: dict[str, list[float]] = field(default_factory=dict)
     aliases: dict[Expression, str] = field(default_factory=dict)
 
@@ -65,6 +75,8 @@ class _Translation:
         match f:
             case stl.Predicate() if self.of_truth:
                 return f"({self.truth(f)} >= 0)"
+            case stl.Predicate() if margins := self.stood_in(f):
+                return f"({margins} >= 0)"
             case stl.Predicate("!=", left, right):
                 return f"(not ({self.side(left)} == {self.side(right)}))"
             case stl.Predicate(operator, left, right):
@@ -122,11 +134,19 @@ class _Translation:
         if expression not in self.aliases:
             known = {name: self.trajectory[name] for name in expression.signals}
             values = np.broadcast_to(expression.evaluate(known), self.trajectory.times.shape)
-            if not np.isfinite(values).all():
-                time = self.trajectory.times[int(np.flatnonzero(~np.isfinite(values))[0])]
-                raise MonitorError(f"{expression} has no finite value at {time:g} s")
             self.aliases[expression] = self.column(values.tolist())
         return self.aliases[expression]
+
+    def stood_in(self, predicate: stl.Predicate) -> str:
+        """Return the alias of a column of a predicate's margins if some need the stand-in; else nothing."""
+        known = {name: self.trajectory[name] for name in predicate.signals}
+        with np.errstate(all="ignore"):
+            margins = np.broadcast_to(predicate.margin(known), self.trajectory.times.shape)
+        is_finite = np.isfinite(margins)
+        if is_finite.all():
+            return ""
+        self.undefined = f"{predicate} has no finite value at {self.trajectory.times[is_finite.argmin()]:g} s"
+        return self.column(np.where(is_finite, margins, self.stand_in).tolist())
 
     def truth(self, predicate: stl.Predicate) -> str:
         """Return the alias of a column that is 1 where a predicate is true and -1 where it is false."""

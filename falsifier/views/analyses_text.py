@@ -31,7 +31,8 @@ def coverage_text(found: Coverage, name: str) -> str:
         if any(r.paces for r in found.ranges):
             lines.append(
                 "  Changes: the fastest of the input in each simulation; slow: the whole range takes "
-                f"{SLOW * found.stop_time:.4g} s or more; fast: {FAST * found.stop_time:.4g} s or less."
+                f"{readable(SLOW * found.stop_time, 4)} s or more; fast: "
+                f"{readable(FAST * found.stop_time, 4)} s or less."
             )
     gaps = [*_gap_rows(found), *_pair_rows(found.pairs)]
     if gaps and found.simulations:

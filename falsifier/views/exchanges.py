@@ -7,7 +7,7 @@ from itertools import takewhile
 from pathlib import Path
 
 from falsifier.core.literals import shell_word
-from falsifier.core.words import counted, in_one_line
+from falsifier.core.words import counted, in_one_line, readable
 from falsifier.llm.messages import Exchange, Message
 from falsifier.record.journal import read_journal
 from falsifier.record.questions import Iteration, iterations
@@ -39,7 +39,7 @@ def _iteration(one: Iteration, before: tuple[Message, ...]) -> Html:
     tokens = sum(exchange.usage.tokens for exchange in one.exchanges)
     seconds = sum(exchange.seconds for exchange in one.exchanges)
     came = "; ".join(o.text or "not simulated" for o in one.samples) or "no candidate"
-    heading = f"{asked} {first}, {tokens} tokens, {seconds:.3g} s: {came}"
+    heading = f"{asked} {first}, {tokens} tokens, {readable(seconds, 3)} s: {came}"
     shown = []
     for exchange in one.exchanges:
         shown.append(exchange_html(exchange, before))

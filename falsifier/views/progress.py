@@ -35,7 +35,7 @@ def make_display(*, quiet: bool = False) -> Iterator[events.Listener]:
             line = _Line(lambda line: update(f"{line.title}: {line.text}"), line_writer(console))
 
             def tell(_name: str, reached: float, stop_time: float) -> None:
-                update(f"{line.title}: simulated {reached:.4g} of {readable(stop_time)} s")
+                update(f"{line.title}: simulated {readable(reached, 4)} of {readable(stop_time)} s")
 
             with watching(tell):
                 yield unbroken(line)

@@ -9,6 +9,7 @@ import pytest
 from falsifier import Candidate, Signal, Trajectory, coverage, falsify
 from falsifier.analyses.coverage import Coverage, coverage_of, pace_of
 from falsifier.core.ranges import ParameterRange, Range
+from falsifier.core.signals import Interpolation
 from falsifier.errors import SpecError
 from falsifier.record.manifest import Manifest, ModeRecord, describe
 from falsifier.search.request import RunRequest
@@ -55,6 +56,12 @@ def test_parts_of_a_range_in_decades_are_decades(tmp_path: Path) -> None:
 def test_a_pulse_between_two_samples_is_seen(hold: float | None, at: float) -> None:
     (u,) = tried(Signal((0.0, at, at + 0.02), (5.0, 95.0, 5.0), "constant", hold)).ranges
     assert (u.high, u.parts[9]) == (95.0, 1)
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "pchip"])
+def test_parts_that_an_input_passes_fast_are_tried(interpolation: Interpolation) -> None:
+    (u,) = tried(Signal((0.0, 4.99, 5.01), (0.0, 0.0, 100.0), interpolation)).ranges
+    assert u.parts.tolist() == [1] * 10
 
 
 def test_values_are_counted_where_they_were_in_time() -> None:

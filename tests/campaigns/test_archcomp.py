@@ -68,6 +68,14 @@ def test_claims_are_judged_by_the_rules(tmp_path: Path, line: str, holds: bool, 
     assert finding.accepted == holds and reason in finding.reason
 
 
+@pytest.mark.parametrize(("claimed", "read"), [("-0.4", -0.4), ("", None), ("NaN", None), ("-inf", None)])
+def test_a_claimed_robustness_that_is_no_number_is_none(
+    tmp_path: Path, claimed: str, read: float | None
+) -> None:
+    (row,) = read_rows(rows(tmp_path, f'S,HARD,1,"[0 1]",[],yes,3,1,1,{claimed},10'))
+    assert row.robustness == read  # JSON has no word for others
+
+
 @pytest.mark.usefixtures("small")
 def test_coarse_inputs_are_piecewise_constant_and_dense_ones_are_as_given(tmp_path: Path) -> None:
     coarse, dense = '"[0 1; 1 -1]"', '"[0 1; 0.5 1; 0.9 -1]"'

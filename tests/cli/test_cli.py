@@ -53,6 +53,7 @@ from tests.command import ROOT, commands, falsifier
         (["run", "AT1", "--max-cost", "nan"], "--max-cost nan: expected a positive number"),
         (["run", "AT1", "--max-tokens", "0"], "--max-tokens 0: expected a whole number from 1 on"),
         (["bench", "AT1", "--total", "seconds=0"], "cost=N (N > 0), for example cost=5"),
+        (["bench", "AT1", "--total", "cost=1", "--total", "cost=5"], "--total: a limit is given twice"),
         (["run", "AT1", "--search", "throttle=100:0"], "falsifier: --search throttle: expected [low, high]"),
         (["run", "AT1", "--search", "throttle=0:nan"], "--search throttle: expected a number, got 'nan'"),
         (["run", "AT1", "--search", "throttle=0:500"], "falsifier: --search throttle: [0, 500] exceeds"),

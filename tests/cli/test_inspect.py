@@ -69,6 +69,15 @@ def test_init_writes_a_spec_that_runs_once_its_requirement_is_filled_in(tmp_path
     assert falsifier("run", "car.toml", "--engine", "uniform", "--budget", "2", cwd=tmp_path).code == 0
 
 
+def test_components_of_the_same_name_are_numbered_and_none_is_lost(tmp_path: Path) -> None:
+    names = ("x/a.fmu", "z/a3.fmu", "y/a.fmu")
+    for name in names:
+        (tmp_path / name).parent.mkdir()
+        shutil.copy(bundled("fmus") / "AT.fmu", tmp_path / name)
+    falsifier("init", *names, "--out", "system.toml", cwd=tmp_path, code=0)
+    assert all(name in (tmp_path / "system.toml").read_text() for name in names)
+
+
 def test_init_writes_where_a_link_leads(tmp_path: Path) -> None:
     (tmp_path / "link.toml").symlink_to("spec.toml")
     falsifier("init", "AT", "--out", "link.toml", cwd=tmp_path, code=0)

@@ -39,6 +39,9 @@ def test_the_prompt_behind_a_run_can_be_printed(tmp_path: Path) -> None:
     assert "the run has no sample 3: it has 2 samples" in none.err
     both = falsifier("llm", "prompt", "AT1", "--after", "run", "--at", "2", cwd=tmp_path, code=2)
     assert "--after: --at prints what a run sent" in both.err
+    ignored = ("--variant", "MP1", "--parameterization", "fixed", "--stl", "G (speed <= 1)")
+    stray = falsifier("llm", "prompt", "run", *ignored, "--at", "2", cwd=tmp_path, code=2)
+    assert all(option in stray.err for option in ignored[::2])
     other = falsifier("llm", "prompt", "CC1", "--after", "run", cwd=tmp_path, code=2)
     assert "run is a run of AT1 on the model" in other.err
 

@@ -39,6 +39,7 @@ def test_quiet_silences_what_simulates_until_the_command_ends() -> None:
         (["--llm", "nobody/x", "--llm-option", "price=2"], "price=2: expected SENT:RECEIVED, finite numbers"),
         (["--llm", "nobody/x", "--llm-option", "price=-1:2"], "price=-1:2: expected SENT:RECEIVED"),
         (["--llm", "nobody/x", "--llm-option", "price=nan:1"], "price=nan:1: expected SENT:RECEIVED"),
+        (["--llm", "nobody/x", *2 * ("--llm-option", "x=1")], "--llm-option: a NAME is given twice"),
         (["--llm", "nobody/x", "--llm-option", "cache=maybe"], "cache=maybe: expected yes, or no"),
         (["--llm", "nobody/x", "--llm-option", "api_key=x"], "keys are read from the environment only"),
         (["--llm", "nobody/x", "--llm-option", "x=http://a:b@c"], "contains a user name or a password"),

@@ -131,6 +131,28 @@ def test_a_folder_is_resumed_without_the_runs_that_only_python_can_continue(
         falsify(lag_problem(), budget=2, directory="a")
 
 
+def test_a_folder_is_resumed_without_the_runs_that_exceed_the_budget(command: Any, tmp_path: Path) -> None:
+    for name, budget in (("a", "2"), ("b", "4")):
+        command("run", "python:tests.problems:impossible", "--budget", budget, "--out", name, code=0)
+    result = command("resume", ".", "--budget", "3", code=0)
+    assert "after 3 simulations" in result.stdout
+    assert "b: this run has 4 simulations already" in result.stderr
+
+
+def test_an_interrupted_folder_is_not_continued_with_the_next_run(
+    command: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("a", "b"):
+        command("run", "python:tests.problems:impossible", "--budget", "2", "--out", name, code=0)
+
+    def interrupt(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("falsifier.search.steps.Steps.start", interrupt)
+    shown = json.loads(command("resume", ".", "--budget", "4", "--json", code=130).stdout)
+    assert shown["directory"] == "a"
+
+
 def test_an_interrupted_run_is_kept_and_resumed(tmp_path: Path) -> None:
     command = [sys.executable, "-c", "from falsifier.cli import main; main()", "run", "AT1"]
     options = ["--engine", "uniform", "--budget", "1000000", "--out", "run"]

@@ -270,6 +270,12 @@ def test_damaged_archives_are_named(tmp_path: Path) -> None:
         read_diagram(tmp_path / "none.mdl")
 
 
+def test_only_line_breaks_end_lines(tmp_path: Path) -> None:
+    path = tmp_path / "a.mdl"
+    path.write_text('Model {\r\n Name "a"\r\n Description "one\f\u2028two"\r\n System {\r\n }\r\n}', "utf-8")
+    assert read_diagram(path).name == "a"
+
+
 def test_bombs_and_parts_that_are_too_large_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

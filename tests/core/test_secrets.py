@@ -69,6 +69,8 @@ def test_options_that_may_hold_a_key_are_recorded_without_it() -> None:
 def test_the_line_of_a_held_secret_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("MY_TOKEN", "quite an ordinary value")
     assert line_of_held_secret("a\nb = quite an ordinary value") == 2
+    monkeypatch.setenv("MY_KEY", "one of\ntwo lines\n")
+    assert line_of_held_secret("a\nb\nc = one of\ntwo lines") == 3
 
 
 @pytest.mark.parametrize(
@@ -102,6 +104,7 @@ def test_the_line_of_a_held_secret_is_found(monkeypatch: pytest.MonkeyPatch) -> 
 )
 def test_secrets_of_settings_sources_and_key_files_are_found(line: str) -> None:
     assert line_of_secret(f"gain = 3\n{line}\n") == 2
+    assert line_of_secret(f"\fgain = 3\u2028\r\n{line}\r\n") == 2, "a line as editors count them"
 
 
 @pytest.mark.parametrize(

@@ -145,7 +145,10 @@ def test_a_range_in_decades_has_exact_ends_and_no_value_beside_them() -> None:
         assert (r.at(0.0), r.at(1.0), r.share_of(r.low), r.share_of(r.high)) == (r.low, r.high, 0.0, 1.0)
         shares = np.linspace(0.0, 1.0, 9)
         assert r.share_of(r.at(shares)) == pytest.approx(shares, abs=1e-12)
-    assert ParameterRange("R", 2.0, 2.0, scale="log").share_of(2.0) == 0.0
+    for value in (2.0, 434.2563620419241):  # whose powers are rounded
+        single = ParameterRange("R", value, value, scale="log")
+        assert single.share_of(value) == 0.0
+        assert SearchSpace((), (single,), 1.0).decode([value]).parameters["R"] == value
     space = SearchSpace((), (wide,), 1.0)
     assert space.decode([1.23456e-6]).parameters["R"] == wide.low, "a rounding"
     for value in (0.0, 1e-6):  # a rounding of the width of all, and not in decades

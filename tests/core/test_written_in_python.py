@@ -1,8 +1,10 @@
 """What users write in Python is refused in words where it is written."""
 
+import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from falsifier.core.arguments import path_of
@@ -32,6 +34,16 @@ def test_a_candidate_consists_of_signals_and_numbers(signals: Any, parameters: A
 def test_numbers_that_no_float_can_be_are_refused() -> None:
     with pytest.raises(SpecError, match="numbers"):
         Signal((0, HUGE), (1, 2))
+
+
+def test_control_points_are_floats_whatever_numbers_are_given() -> None:
+    """A model in Python would calculate with whole numbers, and the record cannot hold those of numpy."""
+    for times in ((0,), (0, 1)):
+        signal = Signal(times, (1,) * len(times), "constant")
+        assert signal.sample(np.array([0.0, 1.0])).dtype == np.float64
+    values: Any = (np.float32(0.5),)
+    written = Candidate({"u": Signal((0.0,), values)}).to_json()
+    assert json.loads(json.dumps(written))["signals"]["u"]["values"] == [0.5]
 
 
 def test_an_empty_text_is_no_path() -> None:

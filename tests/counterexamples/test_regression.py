@@ -5,7 +5,7 @@ from unittest.mock import Mock
 import pytest
 
 from falsifier.counterexamples.regression import Database, check
-from falsifier.errors import SimulationError
+from falsifier.errors import SimulationError, SpecError
 from falsifier.evaluation.confirm import Confirmation, confirm
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.problem import Problem
@@ -53,6 +53,9 @@ def test_what_cannot_be_shrunk_stays_as_it_was_found(monkeypatch: pytest.MonkeyP
     assert checked.result is not None
     assert checked.counterexample == checked.result.counterexample
     assert checked.counterexample and len(calls) == 1
+    monkeypatch.setattr(f"{module}.shrink", Mock(side_effect=SpecError("its simulation fails this time")))
+    kept = check(problem, engine="uniform", budget=100).counterexample
+    assert kept and kept.candidate == checked.counterexample.candidate
     monkeypatch.setattr(f"{module}.shrink", Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         check(problem, engine="uniform", budget=100, database=Database(tmp_path))

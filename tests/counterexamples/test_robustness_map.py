@@ -85,7 +85,10 @@ def test_what_moves_nothing_has_no_influence() -> None:
     found = robustness_map(flat, evaluate(flat, flat.space.decode([1.0] * 4 + [0.0])), budget=8)
     assert set(found.influences) == {0.0}
     assert "None of these changes moved the robustness." in found.text
-    assert "correlates with none of these values" in replace(found, robustness=found.robustness + 1.0).text
+    moved = replace(found, robustness=found.robustness + 1.0)
+    assert "correlates with none of these values" in moved.text
+    hardly = replace(moved, influences=(-0.5, -0.001)).text
+    assert "correlates most with u [V] (-0.50) (rank correlation)" in hardly, "-0.00 is none"
 
 
 def test_changes_stay_within_the_ranges_and_are_repeatable() -> None:
@@ -144,6 +147,36 @@ def test_what_only_moves_along_with_the_size_of_the_changes_has_no_influence() -
     found = robustness_map(problem(), at(problem(), 1.0, -1.0), budget=300)
     assert found.influences[0] < -0.99 and abs(found.influences[1]) < 0.15
     assert robustness_map(problem(), at(problem(), 1.0, -1.0), budget=7).influences[0] < -0.99
+
+
+def test_what_has_one_value_is_not_changed() -> None:
+    fixed = ParameterRange("x0", 0.0, 0.0)
+    lag = lag_problem("G[10,10] (x <= 0.5)", free=Freedom(5, 0.1), parameters=(fixed,))
+    found = robustness_map(lag, at(lag, 1.0, 0.0), budget=20)
+    assert [c.name for c in found.coordinates] == ["u"]
+    assert "random changes of u at once, 100 % of those up to 0.6 %" in found.text
+    alone = lag_problem("G[10,10] (x <= 0.5)", inputs=0, parameters=(fixed,))
+    with pytest.raises(SpecError, match="5 % of a range changes none of the values"):
+        robustness_map(alone, evaluate(alone, Candidate({}, {"x0": 0.0})))
+
+
+def test_items_with_numbers_far_apart_are_changed_to_items() -> None:
+    items = (("init", 1), ("run", 2), ("error", 255))
+    mode = ParameterRange("x0", 1.0, 255.0, kind="enumeration", items=items)
+    modes = lag_problem("G[0,0] (x >= 3)", inputs=0, parameters=(mode,))
+    start = evaluate(modes, Candidate({}, {"x0": 2.0}))
+    near = robustness_map(modes, start, budget=100)
+    assert set(near.values[:, 0]) == {1.0} and len(near.robustness) < 10
+    assert 255.0 in set(robustness_map(modes, start, budget=100, radius=1.0).values[:, 0]) <= {1.0, 255.0}
+
+
+def test_of_one_change_it_is_told_that_it_violates() -> None:
+    found = robustness_map(problem(), at(problem(), 0.4, 0.0), budget=8)
+    count = len(found.robustness)
+    for below, said in ((0, "none of {} violates;"), (1, "1 of {} violates;"), (2, "2 of {} violate;")):
+        robustness = np.where(np.arange(count) < below, -1.0, 1.0)
+        told = said.format(f"{count} random changes of up to 2.5 % of the range")
+        assert told in replace(found, robustness=robustness).text
 
 
 def test_whole_numbers_are_changed_by_whole_numbers_or_not_at_all() -> None:

@@ -1,3 +1,4 @@
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -119,6 +120,19 @@ def test_a_demanded_margin_is_kept() -> None:
     assert shrunk.evaluation.robustness <= -5.0
     with pytest.raises(SpecError, match="more than -9"):
         shrink(problem, original, at_most=-9.0)
+    assert original.robustness is not None
+    close = original.robustness - 1e-9
+    with pytest.raises(SpecError) as refused:
+        shrink(problem, original, at_most=close)
+    shown = re.findall(r"[-+]\d[\d.]+\d", str(refused.value))
+    assert len(set(shown)) == 2, "numbers that differ are told apart"
+
+
+def test_numbers_of_numpy_are_rounded_too() -> None:
+    problem = lag_problem("G[10,10] (not (x > 0.6 and x < 0.65))", free=FREE)
+    times, values = np.array([0.0, 5.0]), np.array([0.5123, 0.6321])
+    original = evaluate(problem, Candidate({"u": Signal(tuple(times), tuple(values), "constant")}))
+    assert shrink(problem, original).minimal
 
 
 def test_half_of_the_margin_is_kept_unless_another_one_is_demanded() -> None:

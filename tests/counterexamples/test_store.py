@@ -1,8 +1,10 @@
 import json
 import shutil
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from falsifier.core.files import bundled
@@ -18,7 +20,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.record.journal import open_journal
 from falsifier.record.run import falsify
 from falsifier.search.budget import Spent
-from falsifier.testing import lag_problem
+from falsifier.testing import Array, lag_problem
 from tests.problems import impossible, never
 from tests.record.test_summary import confirmed
 from tests.stepped import euler_problem
@@ -91,6 +93,18 @@ def test_a_fragile_one_is_no_violation_and_a_failing_simulation_is_an_error() ->
     broken = lag_problem(response=never)
     with pytest.raises(SimulationError, match="out of order"):
         replay(to_store(found), broken)
+
+
+def test_one_that_violates_once_and_not_again_is_not_said_to_hold() -> None:
+    answers = iter([1.0, 1.0, 1.0, 1.0, 0.0])
+
+    def unsteady(times: Array, inputs: dict[str, Array], parameters: dict[str, float]) -> Mapping[str, Array]:
+        return {"x": np.full_like(times, next(answers))}
+
+    problem = lag_problem("G[0,10] (x <= 0.5)", response=unsteady)
+    again = replay(to_store(violation(problem)), problem)
+    assert again.status == "does not violate" and again.confirmation is not None
+    assert "violated, which is not confirmed any more: x <= 0.5 was violated" in again.text
 
 
 @pytest.mark.parametrize(

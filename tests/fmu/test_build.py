@@ -180,6 +180,13 @@ def test_no_compiler_says_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @needs_compiler
+def test_what_is_wrong_in_a_source_of_another_encoding_is_told(tmp_path: Path) -> None:
+    (tmp_path / "a.c").write_bytes(b"int a = unknown; /* gr\xf6\xdfe */")
+    with pytest.raises(ModelError, match=r"(?s)do not compile.*unknown"):
+        compile_c(tmp_path, tmp_path, ["-c", "a.c"])
+
+
+@needs_compiler
 @pytest.mark.skipif(this_platform() != "x86_64-linux", reason="the library of the test is for Linux")
 def test_libraries_beside_that_of_an_fmu_are_found_but_none_that_its_process_needs(tmp_path: Path) -> None:
     place, bad = "binaries/linux64/", ("libm.so.6", "libpthread.so.0")

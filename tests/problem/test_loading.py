@@ -114,6 +114,11 @@ def test_no_spec_is_needed(folder: Path) -> None:
     assert [r.name for r in every.space.inputs] == ["throttle", "brake"]
 
 
+def test_an_fmu_has_no_profiles(folder: Path) -> None:
+    with pytest.raises(SpecError, match=r"AT\.fmu: an FMU has no profile 'fast'"):
+        load_problem(folder / "AT.fmu", stl="G[0,30] (speed <= 120)", profile="fast")
+
+
 def test_endings_of_files_may_be_in_capital_letters(folder: Path) -> None:
     fmu = folder / "AT.fmu"
     fmu.rename(folder / "AT.FMU")
@@ -240,3 +245,13 @@ def test_what_a_users_function_raises_is_said_with_its_line(
         load_problem("python:raises_at_call:boom")
     with pytest.raises(SpecError, match=r"importing raises_at_import raised ZeroDivisionError"):
         load_problem("python:raises_at_import:boom")
+    (tmp_path / "ends.py").write_text("import sys\ndef boom():\n    sys.exit(0)\n")
+    (tmp_path / "ends_at_import.py").write_text("import sys\nsys.exit(0)\n")
+    (tmp_path / "no_number.py").write_text("\nboom = int('x')\n")
+    for module, said in (
+        ("ends", r"boom\(\) raised SystemExit: 0 \(.*ends\.py, line 3\)"),
+        ("ends_at_import", r"importing ends_at_import raised SystemExit: 0 \(.*, line 2\)"),
+        ("no_number", r"base 10: 'x' \(.*no_number\.py, line 2\)$"),
+    ):
+        with pytest.raises(SpecError, match=said):
+            load_problem(f"python:{module}:boom")

@@ -103,6 +103,11 @@ def test_what_is_no_choice_is_named(given: dict[str, Any], message: str) -> None
         changes_from(**given)
 
 
+def test_what_is_no_duration_is_named_by_its_option(at_the_command_line: None) -> None:
+    with pytest.raises(SpecError, match=r"^--stop-time: expected a number greater than 0"):
+        changes_from_options(stop_time=-5.0)
+
+
 def test_numbers_of_numpy_are_numbers() -> None:
     given = changes_from(inputs={"u": np.array([0, 100]), "v": np.int64(3)})  # type: ignore[dict-item]
     assert given == changes_from(inputs={"u": (0, 100), "v": 3})

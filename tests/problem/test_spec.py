@@ -97,6 +97,25 @@ def test_unreadable_files_are_named(tmp_path: Path) -> None:
         read_spec(bad)
 
 
+@pytest.mark.parametrize(
+    "text", ["{}b = 1", "[{}b]", "x = {{ y = 1, {}b = 1 }}", "x = [{{ 'a b'.{}b = 1 }}]"]
+)
+def test_keys_of_too_many_parts_are_refused_before_they_are_read(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.toml"
+    for parts, message in ((501, "has a key of more than 500 parts"), (499, "unknown key")):
+        path.write_text(text.format("a." * (parts - 1) + '"a" . '))
+        with pytest.raises(SpecError, match=message):
+            read_spec(path)
+
+
+@pytest.mark.parametrize("text", ["model.fmu = {}", "components.a.fmu = {}", "context.files = [{}]"])
+def test_what_can_be_no_path_is_named(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.toml"
+    path.write_text(text.format(r'"a\u0000.fmu"') + "\nrequirements.R.formula = 'x <= 1'")
+    with pytest.raises(SpecError, match=r"a\.toml: 'a\\x00\.fmu': no file has .* NUL"):
+        read_spec(path)
+
+
 def test_what_is_told_of_an_fmu_is_said_by_its_folders() -> None:
     """Those of ``context.files.inside``; its description, with annotations, is not among them."""
     said = ContextSection.model_fields["fmu"].description or ""

@@ -91,6 +91,20 @@ def test_a_template_has_the_robustness_of_the_formula_by_hand(template: str, for
     assert len({round(a, 9) for a, _ in values}) > 2
 
 
+@pytest.mark.parametrize(
+    ("template", "stop", "step", "formula"),
+    [
+        ("settles signal=x reference=1 within=1 time=0.1 stays=0.2", 0.3, 0.1, "G[0.1,0.3]"),
+        ("rise signal=x reference=1 time=0.2 after=0.1", 0.3, 0.1, "F[0.1,0.3]"),
+        ("order conditions=['a','b'] during=[0.1,0.3]", 0.3, 0.1, "G[0.1,0.1] not (not a U[0,0.2] b)"),
+        ("response when=a then=b time=86399.9", 86400, 0.1, "G[0,0.1] (a -> F[0,86399.9]"),
+        ("settles signal=x reference=1 within=1 time=2.5e-9", 1e-6, 1e-10, "G[2.5e-09,1e-06]"),
+    ],
+)
+def test_windows_have_no_digits_of_rounding(template: str, stop: float, step: float, formula: str) -> None:
+    assert requirement_of(template).expanded(stop, step).startswith(formula)
+
+
 def test_every_template_was_compared() -> None:
     assert {text.partition(" ")[0] for text, _ in WRITTEN} == set(TEMPLATES)
 

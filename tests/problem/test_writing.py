@@ -49,6 +49,10 @@ def test_the_starter_spec_gives_whole_numbers_their_real_ranges(tmp_path: Path) 
 
 def test_what_the_fmu_does_not_say_is_marked_and_still_loads(tmp_path: Path) -> None:
     info = read_info(fmu_path("Ball_2"))
+    for stop_time in (1 / 30, 12.34567890123456):
+        text = starter_spec(fmu_path("Ball_2"), replace(info, stop_time=stop_time))
+        (tmp_path / "ball.toml").write_text(text)
+        assert loaded(tmp_path / "ball.toml").requirement.formula.horizon() == stop_time
     bare = replace(info, stop_time=None, step_size=None, description="")
     text = starter_spec(fmu_path("Ball_2"), bare)
     assert "# the FMU specifies none" in text

@@ -1,6 +1,7 @@
 """Reading and writing the record of a run."""
 
 import errno
+import fcntl
 import json
 import os
 from contextlib import ExitStack
@@ -10,6 +11,8 @@ from unittest.mock import Mock
 
 import pytest
 
+from falsifier.analyses.coverage import coverage
+from falsifier.campaigns.analysis import load
 from falsifier.core.files import seal
 from falsifier.errors import JournalError, MachineError
 from falsifier.record import journal
@@ -72,6 +75,32 @@ def test_a_journal_whose_records_do_not_follow_each_other_is_damaged(
     (tmp_path / "journal.jsonl").write_bytes(b"".join(lines))
     with pytest.raises(JournalError, match=f"journal.jsonl: {said}"):
         journal.read_journal(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [('"name": "u"', '"name": "v"'), ("NEVER", "OTHER")],
+)
+def test_a_run_whose_journal_names_other_things_than_its_manifest_is_damaged(
+    old: str, new: str, tmp_path: Path
+) -> None:
+    falsify(impossible(), "corners", budget=2, directory=tmp_path)
+    path = tmp_path / "manifest.json"
+    stated = json.loads(path.read_text())
+    del stated["sum"]
+    path.write_text(seal(json.dumps(stated, indent=2).replace(old, new)))
+    for read in (load, coverage, html_report):
+        with pytest.raises(JournalError, match=r"are others than those in manifest\.json"):
+            read(tmp_path)
+
+
+def test_who_looks_whether_a_run_is_worked_on_does_not_keep_others_from_it(tmp_path: Path) -> None:
+    (tmp_path / "lock").touch()
+    looker = (tmp_path / "lock").open("rb")
+    fcntl.flock(looker, fcntl.LOCK_SH)
+    Timer(0.1, looker.close).start()
+    with journal.open_journal(tmp_path):
+        pass
 
 
 def test_what_is_wrong_with_a_value_of_a_record_is_said_with_its_key(tmp_path: Path) -> None:

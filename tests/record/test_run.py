@@ -23,7 +23,7 @@ from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
 from falsifier.problem.source import ProblemSource
 from falsifier.record import manifest
-from falsifier.record.journal import holds_run
+from falsifier.record.journal import holds_run, simulated
 from falsifier.record.run import StopFile, falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.events import Evaluated, Event, RunStarted
@@ -110,6 +110,29 @@ def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Pat
     assert {p.name for p in tmp_path.iterdir() if holds_run(p)} == {"NEVER", "APART"}
     falsify([impossible(), hard()], "corners", budget=2, directory=tmp_path / "shared")
     assert manifest.read(tmp_path / "shared").names == ("NEVER", "HARD")
+
+
+def test_whoever_interrupts_a_search_in_groups_stops_it_and_can_resume_all_of_it(tmp_path: Path) -> None:
+    def stop(event: Event) -> None:
+        if isinstance(event, Evaluated) and not event.replayed:
+            raise KeyboardInterrupt
+
+    problems = [impossible(), lag_problem(points=2, name="APART")]
+    results = falsify(problems, "corners", budget=3, directory=tmp_path, listeners=[stop])
+    assert [(r.status, r.spent.simulations) for r in results] == [("interrupted", 1), ("interrupted", 0)]
+    (found,) = resume(tmp_path, problems=problems, listeners=[stop])
+    assert (found.status, found.problem.name) == ("interrupted", "APART")
+    assert "interrupted" not in {r.status for r in resume(tmp_path, problems=problems)}
+
+
+def test_a_budget_that_one_of_several_runs_has_exceeded_continues_none(tmp_path: Path) -> None:
+    problems = [impossible(), lag_problem(points=2, name="APART")]
+    for problem, budget in zip(problems, (4, 2), strict=True):
+        falsify(problem, "corners", budget=budget, directory=tmp_path / problem.name)
+    before = simulated(tmp_path / "APART")
+    with pytest.raises(SpecError, match="NEVER: this run has 4 simulations already"):
+        resume(tmp_path, problems=problems, budget=3)
+    assert simulated(tmp_path / "APART") == before
 
 
 @pytest.mark.parametrize(

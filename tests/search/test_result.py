@@ -1,10 +1,11 @@
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from falsifier import falsify
+from falsifier import Candidate, Signal, falsify
 from falsifier.campaigns.analysis import load_run
 from falsifier.errors import SpecError
 from falsifier.evaluation.evaluate import evaluate
@@ -37,9 +38,11 @@ def test_a_result_and_its_record_give_every_evaluation(tmp_path: Path) -> None:
     assert load_run(str(tmp_path)).frame().equals(table)
 
 
-def test_of_a_shared_search_each_requirement_has_its_own_rows(tmp_path: Path) -> None:
-    found, never = falsify([lag_problem(name="A"), impossible()], "corners", budget=8, directory=tmp_path)
-    assert found.falsified
+@pytest.mark.parametrize("jobs", [1, 4])
+def test_of_a_shared_search_each_requirement_has_its_own_rows(jobs: int, tmp_path: Path) -> None:
+    problems = [lag_problem(name="A"), impossible()]
+    found, never = falsify(problems, "corners", budget=8, jobs=jobs, directory=tmp_path)
+    assert found.falsified and len(found.evaluations) == found.spent.simulations
     for name, result in (("A", found), ("NEVER", never)):
         rows = load_run(tmp_path, name).columns()
         assert rows["robustness"] == [e.robustness for e in result.evaluations]
@@ -57,6 +60,13 @@ def test_a_constant_and_a_parameter_have_a_column_of_their_name() -> None:
     columns = evaluation_columns([evaluate(problem, problem.space.decode([0.5, 0.25]))])
     assert (columns["u"], columns["bias"]) == ([0.5], [0.25])
     assert evaluation_columns([])["robustness"] == []
+
+
+def test_every_control_point_and_every_name_has_a_column() -> None:
+    steep = Signal((0.0, 4.999999998, 5.0), (0.0, 0.25, 1.0), "linear")
+    columns = evaluation_columns([replace(FOUND, candidate=Candidate({"u": steep}, {"status": 3.0}))])
+    assert columns["status"] == ["ok"] and columns["status (varied)"] == [3.0]
+    assert [column for name, column in columns.items() if "@" in name] == [[0.0], [0.25], [1.0]]
 
 
 def test_without_pandas_the_cure_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

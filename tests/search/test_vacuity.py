@@ -143,6 +143,12 @@ def test_an_input_that_changes_nothing_by_itself_is_told() -> None:
     ]
 
 
+def test_minus_one_is_not_minus_two() -> None:
+    problem = lag_problem("G[0,10] (x <= 2)", inputs=2, limit=2.0, response=deaf)
+    assert seen(problem, (0.5, -1.0), (0.5, -2.0)), "v alone differs"
+    assert not seen(problem, (-1.0, 0.5), (-2.0, 1.0)), "both differ"
+
+
 def test_inputs_that_differ_together_or_have_any_effect_are_no_finding() -> None:
     problem = lag_problem("G[0,10] (x <= 2)", inputs=2, response=deaf)
     assert not seen(problem, (0.5, 0.0), (0.2, 1.0))

@@ -86,6 +86,8 @@ def test_a_negated_alternative_is_a_condition(formula: str) -> None:
          "alternative 2 of 2: load > 0.5 was violated from 3 to 5 s: load = -0.0259 kN at 3 s"),
         ("G[0,5] (load <= 0.1 <-> error >= 6)",
          "load <= 0.1 was violated at 5 s: load = 0.5 kN; while error >= 6 held (error = 9 mm at 5 s)"),
+        ("F (load <= 0) -> G (error <= 9.3)",  # what looks ahead has no value of its own at 0 s
+         "error <= 9.3 was violated at 4 s: error = 9.4 mm; after F (load <= 0) held at 0 s"),
         ("G[0,6] (error <= 20 and load <= 0.9)",
          "load <= 0.9 was violated several times, worst at 0 s: load = 1 kN"),
         ("G[0,4] (load >= 0.9 -> X X (error <= 3))",

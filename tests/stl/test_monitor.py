@@ -204,6 +204,16 @@ def test_predicates_outside_their_domain_are_errors(text: str) -> None:
         Monitor(parse(text), 1.0, 3).evaluate(t)
 
 
+def test_between_two_places_a_predicate_may_have_no_value() -> None:
+    formula = parse("F[0,1] (1/x >= 1) and (y U[0,1] (1/x >= 1)) and G[3,4] (1/x >= 1)")
+    monitor, y = Monitor(formula, 1.0, 5), [1.0] * 5
+    t = trajectory(x=[1.0, 1.0, 0.0, 0.5, 1.0], y=y)
+    assert monitor.evaluate(t).robustness == 1e-300
+    assert monitor.batch({name: column[None] for name, column in t.columns.items()}).tolist() == [1e-300]
+    with pytest.raises(MonitorError, match="no finite value at 4 s"):
+        monitor.evaluate(trajectory(x=[1.0, 1.0, 1.0, 1.0, 0.0], y=y))
+
+
 # -- sub-formulas, batches, other kinds of columns -----------------------------------------------------------
 
 
@@ -283,6 +293,8 @@ def test_what_a_batch_cannot_judge_is_named() -> None:
         monitor.batch({"x": x})
     with pytest.raises(MonitorError, match=r"shape \(m, 3\)"):
         monitor.batch({"x": x, "y": np.ones((3, 3))})
+    with pytest.raises(MonitorError, match=r"shape \(m, 3\), got \[\(\)\]"):
+        monitor.batch(dict.fromkeys("xy", 1.0))  # type: ignore[arg-type]
     y[2, 1] = np.nan
     with pytest.raises(MonitorError, match="trajectory 2: signal 'y' is nan at 1 s"):
         monitor.batch({"x": x, "y": y})

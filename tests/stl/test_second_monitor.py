@@ -56,6 +56,14 @@ def test_what_cannot_be_judged_is_an_error() -> None:
         second_monitor.robustness(parse("G[0,1.5] (x <= 3)"), t)
 
 
+@pytest.mark.parametrize(
+    "text", ["G[1,2] (1/x > 0)", "X (1/x != 3) and F[2,2] (1/x == -1)", "X G (1/x >= -1)"]
+)
+def test_what_has_no_value_while_it_does_not_matter_is_judged(text: str) -> None:
+    t = Trajectory(np.arange(3.0), {"x": np.array([0.0, -1.0, -1.0])})
+    assert second_monitor.robustness(parse(text), t) == Monitor(parse(text), 1.0, 3).evaluate(t).robustness
+
+
 def test_windows_that_are_each_a_little_off_the_grid_fit_together() -> None:
     off = 1 + 8e-7  # of the first sample, so within the tolerance
     formula = parse(f"G[0,{off}] F[0,{off}] G[0,{off}] (x <= 3)")

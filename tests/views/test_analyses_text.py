@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +24,7 @@ def test_what_was_never_tried_is_said_in_words() -> None:
     assert text.startswith("AT1: what 1 simulation tried\n")
     for part in ("2 of 10", "steps in 1", "values 10 to 90\n", "98 of 100 combinations", "never N, D, R"):
         assert part in text, text
+    assert "the whole range takes 43200 s or more" in coverage_text(replace(FOUND, stop_time=86400.0), "DAY")
 
 
 def test_json_has_the_same() -> None:

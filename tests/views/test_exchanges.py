@@ -23,7 +23,7 @@ def chat() -> ScriptedChat:
     texts = [json.dumps({"rationale": f"{EVIL} answer {n}", "signals": s}) for n, s in enumerate(signals, 1)]
     texts[1] = "no idea"
     usage = Usage(prompt_tokens=700, completion_tokens=50, cost=0.0)
-    return ScriptedChat(ChatReply(text=text, seconds=1.5, usage=usage) for text in texts)
+    return ScriptedChat(ChatReply(text=text, seconds=750.0, usage=usage) for text in texts)
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +37,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_each_question_is_told_with_its_rationale_and_what_came_of_it(run: Path) -> None:
     html = exchanges_html(run, NAME, most=10)
     assert html.count('class="exchange"') == 6 and html.count('class="prompt"') == 7
-    assert "2 questions before sample 2, 1500 tokens, 3 s: robustness +" in html
+    assert "2 questions before sample 2, 1500 tokens, 1500 s: robustness +" in html
     assert "no idea" in html and "<b>Rejected: </b>" in html
     assert "&lt;script&gt;alert(1)&lt;/script&gt; answer 1" in html and EVIL not in html
     assert "as in the question before" in html

@@ -1,9 +1,13 @@
 import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
 from falsifier import falsify
 from falsifier.context.values import Named
@@ -125,3 +129,22 @@ def test_if_nothing_gets_better_it_is_told_how_far_the_search_is(capsys: pytest.
         "101 of 1000 simulations, about 40 s left.",
         "201 of 1000 simulations, about 30 s left.",
     ]
+
+
+def test_the_time_that_a_long_simulation_has_reached_is_a_plain_number(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    module, shown = "falsifier.views.progress", list[str]()
+    console = Console(force_terminal=True, file=StringIO())
+    monkeypatch.setattr(f"{module}.error_console", lambda: console)
+    monkeypatch.setattr(f"{module}.live_line", lambda _: nullcontext(shown.append))
+
+    @contextmanager
+    def watching(tell: Callable[[str, float, float], None]) -> Iterator[None]:
+        tell("plant", 43211.3, 86400.0)
+        yield
+
+    monkeypatch.setattr(f"{module}.watching", watching)
+    with make_display():
+        pass
+    assert shown == [": simulated 43211.3 of 86400 s"]

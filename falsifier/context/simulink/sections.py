@@ -66,7 +66,7 @@ def parse_mdl(text: str, shown: str) -> Node:
     # Of each section around: what it is, its line, its values and the sections within it.
     opened: list[tuple[str, int, dict[str, str], list[Node]]] = [("file", 0, {}, [])]
     name, pieces = "", list[str]()  # of the latest value, if it is text: it may go on in lines of its own
-    for number, line in enumerate(map(str.strip, text.splitlines()), start=1):
+    for number, line in enumerate(map(str.strip, text.split("\n")), start=1):
         if not line or line.startswith("#"):
             continue
         if pieces and (piece := _STRING.match(line)):
@@ -106,7 +106,7 @@ def text_parts(text: str) -> dict[str, bytes]:
     """
     parts: dict[str, list[str]] = {}
     inside: list[str] | None = None
-    for line in text.partition(_PACKAGE)[2].splitlines():
+    for line in text.partition(_PACKAGE)[2].split("\n"):
         if line.startswith(_PART):
             name, _, encoding = line[len(_PART) :].strip().partition(" ")
             inside = [] if encoding.strip() else parts.setdefault(name.lstrip("/"), [])

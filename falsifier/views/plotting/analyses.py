@@ -143,8 +143,10 @@ def plot_robustness_map(found: RobustnessMap, title: str = "") -> "Figure":
     centre, colour = "nearest miss", Colour.OUTPUT
     if found.original < 0:
         centre, colour = "counterexample", Colour.VIOLATED
-    below = found.robustness < 0
-    for mask, color, label in ((below, Colour.VIOLATED, "violated"), (~below, Colour.OUTPUT, "satisfied")):
+    for mask, color, label in (  # of simulations that failed, neither is said
+        (found.robustness < 0, Colour.VIOLATED, "violated"),
+        (found.robustness >= 0, Colour.OUTPUT, "satisfied"),
+    ):
         if mask.any():
             left.plot(found.sizes[mask], found.robustness[mask], ".", color=color, markersize=4, label=label)
     left.axhline(0, color=Colour.QUIET, linewidth=0.8, linestyle="--")

@@ -148,7 +148,7 @@ def _quantity(
 
 
 def _input(r: Range, trajectory: Trajectory, candidate: Candidate) -> Panel:
-    signal = candidate.signals[r.name]
+    signal = candidate.signals[r.name].stepped(float(trajectory.times[-1]))
     return Panel(
         with_unit(r.name, r.unit),
         trajectory.times,

@@ -84,7 +84,8 @@ def plot_comparison(runs: Iterable[Run], ax: "Axes | None" = None) -> "Figure":
         ax.bar_label(bars, rates, fontsize=7, padding=2)
     ax.set_xticks(np.arange(len(requirements)), list(map(caption, requirements)))
     ax.set(ylabel="simulations (mean, standard deviation)")
-    ax.legend()
+    if methods:
+        ax.legend()
     return figure_of(ax)
 
 

@@ -56,14 +56,14 @@ def plot(shown: Result | Confirmation | Trajectory) -> "Figure":
 
     Raises:
         SpecError: for anything else.
-        ValueError: for a result in which every simulation failed.
+        ValueError: for a result without a simulation that was judged.
     """
     instance("shown", shown, (Result, Confirmation, Trajectory), "a result, counterexample or trajectory")
     if isinstance(shown, Trajectory):
         return plot_trajectory(shown)
     evaluation = shown.shown if isinstance(shown, Result) else shown.evaluation
     if evaluation is None:
-        raise ValueError("nothing to plot: every simulation failed")
+        raise ValueError("nothing to plot: no simulation was judged")
     return plot_evaluation(shown.problem, evaluation)
 
 

@@ -13,7 +13,6 @@ from falsifier.campaigns.progress import spent_together
 from falsifier.core.candidate import Candidate
 from falsifier.core.ranges import number_names
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import in_one_line
 from falsifier.counterexamples.store import EXPLANATION, SHRUNK, beside, load_counterexample
 from falsifier.errors import FalsifierError
 from falsifier.record.files import recorded_trajectory
@@ -51,7 +50,7 @@ class Shown:
             return "violation that was not confirmed"
         if not self.run.falsified:
             return "simulation nearest to a violation"
-        if self.is_shrunk and in_one_line(self.candidate) == in_one_line(_recorded(self.run)):
+        if self.is_shrunk and self.candidate.key == _recorded(self.run).key:
             return "counterexample, of which no simpler one was found nearby"
         return "shrunk counterexample" if self.is_shrunk else "counterexample"
 
@@ -62,7 +61,7 @@ class Shown:
         journal = self.run.directory / JOURNAL
         if self._is_doubtful or not file.is_file() or file.stat().st_mtime < journal.stat().st_mtime:
             return ""  # of a run without a counterexample it is about the nearest miss
-        return file.read_text(encoding="utf-8").strip()
+        return file.read_text(encoding="utf-8", errors="replace").strip()
 
     @property
     def _is_doubtful(self) -> bool:

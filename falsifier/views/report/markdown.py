@@ -93,4 +93,4 @@ def _environment(side: Side) -> str:
         + ", ".join(f"{name} {version}" for name, version in m.packages.items())
         for m in (run.manifest for run in side.runs)
     )
-    return f"{'; '.join(told)}."
+    return f"{markdown_text('; '.join(told))}."

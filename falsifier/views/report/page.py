@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from falsifier.campaigns.analysis import Run, Table, group
 from falsifier.core.files import file_name
 from falsifier.core.literals import shell_word
-from falsifier.core.words import counted
+from falsifier.core.words import counted, readable
 from falsifier.problem.problem import held_text
 from falsifier.stl.margins import signed
 from falsifier.views.exchanges import exchanges_html
@@ -214,7 +214,8 @@ def _runs(runs: Sequence[Run]) -> Html:
         simulation = run.spent.simulation_seconds / max(1, run.simulations)
         proposal = run.spent.engine_seconds / max(1, run.simulations)
         asked = ", questions included" if run.spent.questions else ""
-        seconds = f"simulation {simulation:.3g}, proposal {proposal:.3g}{asked}" if run.simulations else "–"
+        seconds = f"simulation {readable(simulation, 3)}, proposal {readable(proposal, 3)}{asked}"
+        seconds = seconds if run.simulations else "–"
         ended = wording.replay_command(run) if run.falsified else run.reason
         rows.append((run_name(run), run.status, run.spent.simulations_text, robustness, seconds, ended))
     header = ("run", "ended", "simulations", "robustness", "seconds on average", "replay, or why it ended")

@@ -9,7 +9,7 @@ import numpy as np
 
 from falsifier.analyses.coverage import coverage_of
 from falsifier.campaigns.analysis import Run, Table
-from falsifier.core.literals import shell_word
+from falsifier.core.literals import shell_word, shortest
 from falsifier.core.signals import Signal
 from falsifier.core.words import choosing, counted, in_unit, listed, readable, with_unit
 from falsifier.counterexamples.store import SHRUNK, beside
@@ -235,7 +235,7 @@ def _options(request: RunRequest) -> list[tuple[str, object]]:
 def _parameterization(problem: ProblemSource) -> str | None:
     kind = "fixed" if problem.parameterization == "fixed" else None
     if problem.shortest_piece is not None:
-        kind = f"free:{problem.shortest_piece:g}"
+        kind = f"free:{shortest(problem.shortest_piece)}"
     return ",".join(word for word in (problem.profile, kind) if word) or None
 
 
@@ -245,8 +245,8 @@ def _llm_options(llm: LLMSettings) -> list[tuple[str, object]]:
         ("--api-base", llm.api_base),
         ("--variant", llm.variant),
         *(("--llm-option", f"{name}={value}") for name, value in llm.options.items()),
-        ("--llm-option", None if llm.price is None else f"price={llm.price[0]:g}:{llm.price[1]:g}"),
-        ("--llm-option", None if llm.timeout is None else f"timeout={llm.timeout:g}"),
+        ("--llm-option", None if llm.price is None else f"price={':'.join(map(shortest, llm.price))}"),
+        ("--llm-option", None if llm.timeout is None else f"timeout={shortest(llm.timeout)}"),
         ("--llm-option", None if llm.cache else "cache=no"),
         ("--anonymous", True if llm.anonymous else None),
     ]

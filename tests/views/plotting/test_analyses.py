@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -102,6 +103,14 @@ def test_two_coordinates_are_a_map_whose_boundary_lies_where_the_violation_ends(
     mesh = next(c for c in surface.collections if type(c).__name__ == "QuadMesh")
     (red, _, blue, _), (red_, _, blue_, _) = mesh.to_rgba(np.array([-1e-3, 1e-3]) * abs(found.original))
     assert red > blue and blue_ > red_, "violations have a colour of their own, however small"
+
+
+def test_of_a_failed_simulation_the_picture_of_a_map_says_nothing() -> None:
+    lag = lag_problem(points=1)
+    found = robustness_map(lag, evaluate(lag, lag.space.decode([1.0])), budget=7)
+    failed = replace(found, robustness=np.full_like(found.robustness, np.nan))
+    lines = plot_robustness_map(failed).axes[0].get_lines()
+    assert {line.get_label() for line in lines}.isdisjoint({"satisfied", "violated"})
 
 
 def test_a_single_coordinate_is_a_line_through_the_counterexample(tmp_path: Path) -> None:

@@ -1,7 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from falsifier.core.candidate import Candidate
+from falsifier.core.ranges import Freedom
 from falsifier.core.signals import Signal
 from falsifier.evaluation.evaluate import evaluate
 from falsifier.stl import parse
@@ -40,3 +43,15 @@ def test_each_compared_quantity_has_a_panel_and_then_each_input() -> None:
     ]
     assert set(first.bounds[0].values.tolist()) == {0.9}
     assert second.values.tolist() == (first.values - last.values).tolist()
+
+
+def test_a_step_that_is_sampled_and_held_is_drawn_where_the_model_gets_it() -> None:
+    problem = lag_problem(free=Freedom(5, 0.1))
+    held = tuple(replace(r, hold=1.0) for r in problem.space.inputs)
+    problem = replace(problem, space=replace(problem.space, inputs=held))
+    step = problem.space.admit(Candidate({"u": Signal((0.0, 2.5), (0.0, 1.0), "constant")}))
+    found = evaluate(problem, step)
+    assert found.trajectory is not None
+    last = panels(problem.requirement.formula, found.trajectory, step, held, found.verdict, {})[-1]
+    assert last.points == ((0.0, 0.0), (3.0, 1.0))
+    assert last.values.tolist() == found.trajectory["u"].tolist()

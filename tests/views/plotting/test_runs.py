@@ -2,6 +2,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
@@ -40,3 +41,9 @@ def test_a_comparison_has_a_bar_for_each_requirement_and_method(campaign: Path) 
     assert [bar.get_height() for bar in bars] == [1.5, 0.0, 1.5, 0.0]
     assert [text.get_text() for text in ax.texts] == ["2/2", "0/2", "2/2", "0/2"]
     assert [tick.get_text() for tick in ax.get_xticklabels()] == ["HARD", "NEVER"]
+
+
+@pytest.mark.filterwarnings("error")
+def test_of_no_runs_empty_axes_are_drawn() -> None:
+    for plot in (plot_comparison, plot_rates, plot_history):
+        assert plot([]).axes[0].get_legend() is None

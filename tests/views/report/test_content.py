@@ -3,6 +3,7 @@ from dataclasses import replace
 from html import unescape
 from pathlib import Path
 
+from falsifier.campaigns.analysis import load
 from falsifier.core.candidate import Candidate
 from falsifier.core.signals import Signal
 from falsifier.counterexamples.store import load_counterexample, save, to_store
@@ -18,7 +19,7 @@ from falsifier.search.request import LLMSettings, RunRequest
 from falsifier.testing import lag_problem
 from falsifier.views.report import markdown_report
 from falsifier.views.report.content import gather
-from falsifier.views.report.page import html_report
+from falsifier.views.report.page import _runs, html_report
 from falsifier.views.report.wording import run_command
 from tests.campaigns.support import record_ad_hoc
 from tests.problems import hard, mostly_broken
@@ -49,10 +50,11 @@ def test_versions_of_all_machines_are_told(tmp_path: Path) -> None:
     for name in ("a", "b", "c"):
         falsify(hard(), "uniform", budget=1, directory=tmp_path / name)
     known = manifest.read(tmp_path / "b")
-    manifest.write(tmp_path / "b", known.model_copy(update={"platform": "Node-7"}))
+    manifest.write(tmp_path / "b", known.model_copy(update={"platform": "<Node-7>"}))
+    assert r"\<Node-7>" in markdown_report(tmp_path), "what others wrote is no markup"
     last = markdown_report(tmp_path).replace("\\", "").splitlines()[-1]
-    assert [last.count(of) for of in (known.platform, "Node-7", "; falsifier ")] == [1, 1, 1]
-    assert f"<dd>{known.platform}; Node-7</dd>" in html_report(tmp_path)
+    assert [last.count(of) for of in (known.platform, "<Node-7>", "; falsifier ")] == [1, 1, 1]
+    assert f"<dd>{known.platform}; &lt;Node-7&gt;</dd>" in html_report(tmp_path)
 
 
 def test_real_inputs_are_drawn_as_they_were_and_not_as_whole_numbers(tmp_path: Path) -> None:
@@ -90,20 +92,29 @@ def test_a_search_can_be_repeated_from_its_command() -> None:
     assert "no option states step_size" in run_command(request.model_copy(update={"problems": (source,)}))
     assert "my own" in run_command(request.model_copy(update={"engine": "my own"}))
     assert "known inputs" in run_command(request.model_copy(update={"start_from": ({},)}))
+    free = ProblemSource(target="AT1", parameterization="free", shortest_piece=0.123456789)
+    assert "--parameterization free:0.123456789 " in run_command(RunRequest(problems=(free,)))
     model = LLMSettings(
         name="openai/gpt-5-mini",
         effort="high",
         variant="MP4",
-        price=(0.25, 2),
+        price=(0.12345678, 2),
         anonymous=True,
         timeout=30,
         cache=False,
     )
     asked = RunRequest(problems=(ProblemSource(target="AT1"),), llm=model, budget=Budget(None, 9.0))
     assert run_command(asked) == (
-        "falsifier run AT1 --llm openai/gpt-5-mini@high --variant MP4 --llm-option price=0.25:2 "
+        "falsifier run AT1 --llm openai/gpt-5-mini@high --variant MP4 --llm-option price=0.12345678:2 "
         "--llm-option timeout=30 --llm-option cache=no --anonymous --seconds 9.0 --seed 0"
     )
+
+
+def test_how_long_slow_simulations_take_is_a_plain_number(tmp_path: Path) -> None:
+    falsify(hard(), "uniform", budget=1, directory=tmp_path)
+    (run,) = load(tmp_path)
+    slow = replace(run, spent=replace(run.spent, simulation_seconds=1234.5))
+    assert "simulation 1234.5, proposal" in _runs([slow])
 
 
 def test_causes_of_failures_and_what_was_not_searched_are_in_every_report(tmp_path: Path) -> None:
@@ -142,6 +153,13 @@ def test_the_shrunk_counterexample_and_its_explanation_are_shown_if_there_are_an
     assert not gather(tmp_path)[0].sections[0].shown[0].is_shrunk, "the samples are those of another one"
     original.evaluation.trajectory.save(tmp_path / "shrunk.npz")
     assert "The counterexample, of which no simpler one was found nearby:" in markdown_report(tmp_path)
+    shown = gather(tmp_path)[0].sections[0].shown[0]
+    signal = shown.candidate.signals["u"]
+    times = (*signal.times[:-1], signal.times[-1] + 1e-7)
+    rounder = replace(shown.candidate, signals={"u": replace(signal, times=times)})
+    assert replace(shown, candidate=rounder).what == "shrunk counterexample", "also by digits not shown"
+    (tmp_path / "explanation.txt").write_bytes(b"Because \xff")
+    assert "Because \N{REPLACEMENT CHARACTER}" in html_report(tmp_path)
     os.utime(tmp_path / "explanation.txt", (0, 0))
     assert not gather(tmp_path)[0].sections[0].shown[0].explanation, "the run went on since"
     (tmp_path / "shrunk.npz").write_bytes(b"damaged")
