@@ -107,7 +107,7 @@ class _Joiner:
     ) -> None:
         self._inputs = {v.name: v for v in frame.inputs}
         self._members, self._structures, self._coupling = members, structures, coupling
-        self._fed: dict[tuple[int, int, int], str] = {}
+        self._fed: dict[tuple[int, str, int, int], str] = {}
         self.links: list[Link] = []
         self.notes: list[str] = []
 

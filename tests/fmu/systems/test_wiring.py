@@ -100,6 +100,18 @@ def test_an_output_may_feed_several_inputs_and_arrays_go_element_by_element() ->
     assert found.info.connections == (("a.y[1]", "b.u[1]"), ("a.y[2]", "b.u[2]"), ("a.y[2]", "c.u"))
 
 
+def test_variables_of_two_types_may_have_the_same_reference(tmp_path: Path) -> None:
+    """As OpenModelica writes them: FMI 2 counts the references of each type by themselves."""
+    fmu = fixtures.altered(
+        fixtures.path("Echo_2"),
+        tmp_path / "e.fmu",
+        lambda xml: xml.replace(b'"in_Integer" valueReference="1"', b'"in_Integer" valueReference="0"'),
+    )
+    parts, links = {"a": "Echo_2", "b": Component(fmu)}, {"b.in_Real": "a.out_Real"}
+    assert "b.in_Integer" in [v.name for v in system(parts, links).info.inputs]
+    assert len(system(parts, {**links, "b.in_Integer": "a.out_Integer"}).network.links) == 2
+
+
 @pytest.mark.parametrize("name", ["Lag_2", "Stiff_2"], ids=["co-simulation", "model exchange"])
 def test_components_with_a_windows_library_only_are_refused(name: str) -> None:
     path = fixtures.FOLDER / "win64" / f"{name}.fmu"
