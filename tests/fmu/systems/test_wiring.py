@@ -187,6 +187,8 @@ def test_an_input_of_the_whole_closes_no_loop() -> None:
     fmus = {name: fixtures.path("Gain_2") for name in ("first", "last")}
     found = System(fmus, links, coupling=Coupling(loops="iterate"), frame=frame)
     assert found.network.loops == () and order(found) == ["first", "last"]
+    found = System(fmus, {"first.r": "r"}, coupling=Coupling("jacobi"), frame=frame)
+    assert found.info.notes[0] == "components step in the order first, last", "it is not late either"
 
 
 MODEL = system({"table": "Table_3", "plant": "Lead_2", "pi": "Gain_2"}, LOOP, Coupling(loops="iterate"))
