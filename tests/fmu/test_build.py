@@ -199,3 +199,25 @@ def test_libraries_beside_that_of_an_fmu_are_found_but_none_that_its_process_nee
         for name in names:
             (folder / name).touch()
         assert {file.name for file in _libraries(tmp_path)} == {"Lag.so", "liba.so"}
+
+
+# Long enough not to be repeated to find out how the next simulation may start.
+SLOW_AND_ONCE = """#define _GNU_SOURCE
+#include <stdlib.h>
+#include <time.h>
+static void crash_twice(void) { static int made; if (made++) abort(); }
+static void sleep_a_bit(void) { nanosleep(&(struct timespec){0, 600000000}, NULL); }
+"""
+
+
+@needs_compiler
+def test_a_second_instance_that_crashes_is_not_tried_again_after_long_simulations(tmp_path: Path) -> None:
+    shell = text_of("Lag_2sources", "sources/shell2.c")
+    for after, call in (("Instance *m = create();", "crash_twice();"), ("m->time = time;", "sleep_a_bit();")):
+        shell = shell.replace(after, f"{call} {after}", 1)
+    source = rearranged(tmp_path, "Lag_2sources", {"sources/shell2.c": SLOW_AND_ONCE + shell})
+    model = FmuModel(compile_sources(source, tmp_path / "out.fmu"))
+    for _ in range(2):
+        run(model, ("x",), interval=0.5)
+    (found,) = fixtures.runners(model)
+    assert found.untrusted == ("reset", "state", "instance")

@@ -71,8 +71,8 @@ class Runner:
             except (ModelError, SimulationError):
                 raise failure from None
             repeated = self._simulate(speaking, plan, given)
-            if is_reused and reuse is not None:
-                self._distrust(reuse)
+            if is_reused:
+                self._distrust(reuse or "instance")  # as after a first simulation too long to be repeated
             return repeated
 
     def load(self, plan: Plan) -> None:
