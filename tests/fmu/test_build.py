@@ -221,3 +221,14 @@ def test_a_second_instance_that_crashes_is_not_tried_again_after_long_simulation
         run(model, ("x",), interval=0.5)
     (found,) = fixtures.runners(model)
     assert found.untrusted == ("reset", "state", "instance")
+
+
+@needs_compiler
+def test_a_value_that_is_set_no_more_is_not_kept_by_a_reset(tmp_path: Path) -> None:
+    reset = "const double gain = ((Instance *)c)->v[GAIN]; restart(c); ((Instance *)c)->v[GAIN] = gain;"
+    shell = text_of("Lag_2sources", "sources/shell2.c").replace("restart(c);", reset, 1)
+    source = rearranged(tmp_path, "Lag_2sources", {"sources/shell2.c": shell})
+    model = FmuModel(compile_sources(source, tmp_path / "out.fmu"))
+    given: tuple[dict[str, float], ...] = ({}, {}, {"gain": 3.0}, {})
+    ends = [run(model, ("y",), signals={"u": ramp(1.0)}, parameters=each)["y"][-1] for each in given]
+    assert ends == [ends[0], ends[0], 3.0 * ends[0], ends[0]] and fixtures.runner(model).reuse == "reset"

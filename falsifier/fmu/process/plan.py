@@ -46,6 +46,11 @@ class Plan:
         return SHARES if self.experiment.time_limit is None else 0
 
     @property
+    def names(self) -> frozenset[str]:
+        """Names of all variables that a simulation sets."""
+        return frozenset((*self.inputs, *self.parameters, *(name for name, _ in self.experiment.strings)))
+
+    @property
     def given(self) -> int:
         """How many numbers a simulation is given; see ``given_values``."""
         return len(self.parameters) + len(self.inputs) * 5 * self.pieces

@@ -174,6 +174,9 @@ class Runner:
         if self._worker is not None and not self._worker.program.is_alive:  # since its last simulation
             self._drop()
         worker = self._worker
+        if worker is not None and worker.plan and worker.plan is not plan and worker.plan.names - plan.names:
+            self._drop()  # a reset that was tested with the same values may keep those that are set no more
+            worker = None
         if worker is None:
             logging = self._order.logging
             worker = Worker(self._workplace(), self._order, self.reuse, self.untrusted, logging=logging)
