@@ -115,7 +115,7 @@ def _reached(start: int, before: Sequence[set[int]]) -> set[int]:
 
 
 def late_links(
-    links: Iterable[Link], order: Sequence[int], loops: Sequence[tuple[int, int]] = ()
+    links: Iterable[Link], order: Sequence[int], loops: Sequence[tuple[int, int]]
 ) -> Iterator[Link]:
     """Yield the connections of components whose target steps before their source, unless both iterate."""
     position = {member: k for k, member in enumerate(order)}
