@@ -115,8 +115,10 @@ def _reached(plan: Plan, time: float) -> tuple[str, float | None]:
 
 
 def last_lines(log: tuple[str, ...]) -> str:
-    """Return the end of an error message: the last of the FMU's messages."""
-    lines = tuple(dict.fromkeys(line for line in log if line.strip()))[-_SHOWN_LINES:]
+    """Return the end of an error message: the FMU's last messages, from the first about a panic of Rust."""
+    lines = tuple(dict.fromkeys(line for line in log if line.strip()))
+    panics = [k for k, line in enumerate(lines) if " panicked at " in line]
+    lines = lines[panics[0] :][:_SHOWN_LINES] if panics else lines[-_SHOWN_LINES:]
     if len(lines) > 1:
         return f"; its last messages: {'; '.join(lines)}"
     return f"; its last message: {lines[0]}" if lines else ""
