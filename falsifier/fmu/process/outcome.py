@@ -64,7 +64,8 @@ def failure(
     loops = (range(first, last) for first, last in network.loops)
     together = next((loop for loop in loops if reply.component in loop), ())
     text = _TEXTS.get(reply.where, _EVENT)
-    if reply.where == Where.STEPPING and reply.time == 0.0 and reply.status != _PENDING:
+    is_first = reply.where == Where.STEPPING and reply.time == 0.0 and reply.status != _PENDING
+    if is_first and member.interface == "co-simulation":
         text = _FIRST_STEP
     said = text.format(
         text=reply.text,

@@ -181,7 +181,7 @@ def read_told(data: bytes) -> Told:
             case b"p":
                 refused.append("tried to change the settings of another process, which was refused")
             case b"f":
-                refused.append("tried to start more than 256 processes or 8192 threads")
+                refused.append(f"tried to start more than {path}")
     shown = first_few(refused, _SHOWN_REFUSALS, between="; it ")
     return Told("; ".join(causes), f"the FMU {shown}" if shown else "", enforced)
 
