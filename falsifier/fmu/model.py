@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from falsifier.core.arguments import path_of
 from falsifier.core.experiment import Experiment
 from falsifier.core.model import Interface, Model, ModelInfo
-from falsifier.core.signals import Signal, constant_pieces
+from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import ModelError
 from falsifier.fmu.description.archive import WINDOWS, file_hash
 from falsifier.fmu.description.model_description import Description, describe, needed_tool_text
 from falsifier.fmu.process.network import Coupling, Member, Network, Place
 from falsifier.fmu.process.order import Order
+from falsifier.fmu.process.plan import held_pieces
 from falsifier.fmu.process.registry import Isolated, load, simulate
 from falsifier.fmu.systems.system import System
 
@@ -111,7 +112,7 @@ class FmuModel(Isolated):
             for variable in self.info.inputs:
                 if variable.name in signals and not variable.is_continuous:
                     signal, whole = signals[variable.name], variable.kind != "real"
-                    tables[variable.name] = _held_pieces(signal, experiment.times, whole=whole)
+                    tables[variable.name] = held_pieces(signal, experiment.times, whole=whole)
         return tables
 
     def _with_hint(self, error: ModelError) -> ModelError:
@@ -123,14 +124,6 @@ class FmuModel(Isolated):
     @property
     def _description(self) -> Description:
         return describe(self.path, self.sha256)
-
-
-def _held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> NDArray[np.float64]:
-    """Return constant pieces that start at the sample times at which the signal changes."""
-    values = signal.sample(times)
-    values = np.rint(values) if whole else values
-    changes = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
-    return constant_pieces(times[changes], values[changes])
 
 
 def _check_interface(model: FmuModel) -> None:

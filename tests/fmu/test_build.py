@@ -11,8 +11,8 @@ import pytest
 from falsifier.core.compiler import compile_c, compiler
 from falsifier.core.files import bundled
 from falsifier.core.signals import Signal
-from falsifier.errors import ModelError
-from falsifier.fmu import FmuModel, read_info
+from falsifier.errors import ModelError, SimulationError
+from falsifier.fmu import FmuModel, read_info, rights_text
 from falsifier.fmu.build import compile_sources
 from falsifier.fmu.description.archive import read_entry, this_platform
 from falsifier.fmu.process.start import _libraries
@@ -206,3 +206,59 @@ def test_libraries_beside_that_of_an_fmu_are_found_but_none_that_its_process_nee
         for name in names:
             (folder / name).touch()
         assert {file.name for file in _libraries(tmp_path)} == {"Lag.so", "liba.so"}
+
+
+# Long enough not to be repeated to find out how the next simulation may start.
+SLOW_AND_ONCE = """#define _GNU_SOURCE
+#include <stdlib.h>
+#include <time.h>
+static void crash_twice(void) { static int made; if (made++) abort(); }
+static void sleep_a_bit(void) { nanosleep(&(struct timespec){0, 600000000}, NULL); }
+"""
+
+
+@needs_compiler
+def test_a_second_instance_that_crashes_is_not_tried_again_after_long_simulations(tmp_path: Path) -> None:
+    shell = text_of("Lag_2sources", "sources/shell2.c")
+    for after, call in (("Instance *m = create();", "crash_twice();"), ("m->time = time;", "sleep_a_bit();")):
+        shell = shell.replace(after, f"{call} {after}", 1)
+    source = rearranged(tmp_path, "Lag_2sources", {"sources/shell2.c": SLOW_AND_ONCE + shell})
+    model = FmuModel(compile_sources(source, tmp_path / "out.fmu"))
+    for _ in range(2):
+        run(model, ("x",), interval=0.5)
+    (found,) = fixtures.runners(model)
+    assert found.untrusted == ("reset", "state", "instance")
+
+
+@needs_compiler
+def test_a_value_that_is_set_no_more_is_not_kept_by_a_reset(tmp_path: Path) -> None:
+    reset = "const double gain = ((Instance *)c)->v[GAIN]; restart(c); ((Instance *)c)->v[GAIN] = gain;"
+    shell = text_of("Lag_2sources", "sources/shell2.c").replace("restart(c);", reset, 1)
+    source = rearranged(tmp_path, "Lag_2sources", {"sources/shell2.c": shell})
+    model = FmuModel(compile_sources(source, tmp_path / "out.fmu"))
+    given: tuple[dict[str, float], ...] = ({}, {}, {"gain": 3.0}, {})
+    ends = [run(model, ("y",), signals={"u": ramp(1.0)}, parameters=each)["y"][-1] for each in given]
+    assert ends == [ends[0], ends[0], 3.0 * ends[0], ends[0]] and fixtures.runner(model).reuse == "reset"
+
+
+BECOMES = """
+for (int k = 0; k < 40; k++) {
+    char name[4096];
+    snprintf(name, sizeof name, "PLACE/%d", k);
+    open(name, O_WRONLY | O_CREAT, 0600);
+}
+execl("/bin/true", "true", (char *)0);
+m->time = time;"""
+
+
+@needs_compiler
+def test_what_ended_a_process_is_told_after_much_that_was_refused(tmp_path: Path) -> None:
+    if "not enforce" in rights_text():
+        pytest.skip("this machine does not tell all that is refused")
+    shell = text_of("Lag_2sources", "sources/shell2.c")
+    shell = shell.replace("m->time = time;", BECOMES.replace("PLACE", str(tmp_path)), 1)
+    shell = f"#include <fcntl.h>\n#include <unistd.h>\n{shell}"
+    source = rearranged(tmp_path, "Lag_2sources", {"sources/shell2.c": shell})
+    model = FmuModel(compile_sources(source, tmp_path / "out.fmu"), allow=("programs",))
+    with pytest.raises(SimulationError, match="the FMU replaced its program by /bin/true; the FMU tried to"):
+        run(model, ("x",))

@@ -73,6 +73,12 @@ def test_a_model_that_leaves_its_domain_fails_with_the_time() -> None:
         run(isolated("VanDerPol_2", ME), ("x",), stop=50.0, parameters={"mu": -1.0, "x": 5.0})
 
 
+@pytest.mark.parametrize("name", LAGS)
+def test_derivatives_that_are_not_finite_at_the_start_are_told(name: str) -> None:
+    with pytest.raises(SimulationError, match=r"the derivatives are NaN, .* at t = 0 s, before .* 1 s$"):
+        run(isolated(name, ME), ("x",), parameters={"T": 0.0})
+
+
 BALLS = ["Ball_1me", "Ball_2", "Ball_3"]
 
 

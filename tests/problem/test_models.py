@@ -127,6 +127,7 @@ def test_what_an_fmu_may_do_comes_from_spec_requirement_and_options(tmp_path: Pa
     ("allow", "deny", "message"),
     [
         ("write:absent", "", "absent: there is no such file or folder; create it first"),
+        ("write:~no-such-user/x", "", "~no-such-user/x: there is no such file or folder; create it first"),
         ("reading", "", "unknown 'reading'.*write:PATH, read:PATH, programs"),
         ("", "files", "unknown 'files'.*network"),
     ],

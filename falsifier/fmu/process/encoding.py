@@ -45,7 +45,7 @@ def reals(*numbers: float) -> bytes:
 
 def text(words: str) -> bytes:
     """Return a text as it is in requests."""
-    return block(words.encode() + b"\0")
+    return block(words.encode("utf-8", "surrogateescape") + b"\0")  # paths may be any bytes
 
 
 def block(data: bytes) -> bytes:

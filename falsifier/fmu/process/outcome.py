@@ -64,7 +64,8 @@ def failure(
     loops = (range(first, last) for first, last in network.loops)
     together = next((loop for loop in loops if reply.component in loop), ())
     text = _TEXTS.get(reply.where, _EVENT)
-    if reply.where == Where.STEPPING and reply.time == 0.0 and reply.status != _PENDING:
+    is_first = reply.where == Where.STEPPING and reply.time == 0.0 and reply.status != _PENDING
+    if is_first and member.interface == "co-simulation":
         text = _FIRST_STEP
     said = text.format(
         text=reply.text,
@@ -115,8 +116,10 @@ def _reached(plan: Plan, time: float) -> tuple[str, float | None]:
 
 
 def last_lines(log: tuple[str, ...]) -> str:
-    """Return the end of an error message: the last of the FMU's messages."""
-    lines = tuple(dict.fromkeys(line for line in log if line.strip()))[-_SHOWN_LINES:]
+    """Return the end of an error message: the FMU's last messages, from the first about a panic of Rust."""
+    lines = tuple(dict.fromkeys(line for line in log if line.strip()))
+    panics = [k for k, line in enumerate(lines) if " panicked at " in line]
+    lines = lines[panics[0] :][:_SHOWN_LINES] if panics else lines[-_SHOWN_LINES:]
     if len(lines) > 1:
         return f"; its last messages: {'; '.join(lines)}"
     return f"; its last message: {lines[0]}" if lines else ""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.experiment import Experiment
+from falsifier.core.signals import Signal, constant_pieces
 from falsifier.errors import ModelError, SimulationError, did_you_mean
 from falsifier.fmu.description.model_description import Description
 
@@ -44,6 +45,11 @@ class Plan:
         So slow models are simulated, and those that hang are ended.
         """
         return SHARES if self.experiment.time_limit is None else 0
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of all variables that a simulation sets."""
+        return frozenset((*self.inputs, *self.parameters, *(name for name, _ in self.experiment.strings)))
 
     @property
     def given(self) -> int:
@@ -97,6 +103,14 @@ def make_plan(
         every=round(experiment.output_interval / experiment.step),
         pieces=pieces,
     )
+
+
+def held_pieces(signal: Signal, times: NDArray[np.float64], *, whole: bool) -> NDArray[np.float64]:
+    """Return constant pieces that start at the sample times at which the signal changes."""
+    values = signal.sample(times)
+    values = np.rint(values) if whole else values
+    changes = np.flatnonzero(np.diff(values, prepend=np.nan) != 0)
+    return constant_pieces(times[changes], values[changes])
 
 
 def given_values(

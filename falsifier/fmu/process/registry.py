@@ -202,8 +202,10 @@ def rights_text(allow: Collection[str] = (), deny: Collection[str] = ()) -> str:
     wanted, workplace = Rights.of(allow, deny), REGISTRY.workplace()
     told, until = b"", time.monotonic() + _SETUP_SECONDS
     started = Started(workplace, workplace.scratch(), wanted, through_wine=False)
-    while not told.endswith(b"\0") and time.monotonic() < until:
+    while not told.endswith(b"\0") and started.program.is_alive and time.monotonic() < until:
         told += started.program.told()
         time.sleep(_LOOKING_SECONDS)
+    if not told:
+        raise started.not_started()
     started.end()
     return described(wanted, read_told(told).enforced)

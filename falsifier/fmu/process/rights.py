@@ -106,7 +106,8 @@ def _advice(word: str) -> str:
 def _kind_and_path(word: str) -> tuple[str, Path | None]:
     """Split what is allowed with a path; None for all else."""
     kind, _, path = word.partition(":")
-    return kind, Path(path.strip()).expanduser() if kind in _PATHS and path.strip() else None
+    path = os.path.expanduser(path.strip())  # noqa: PTH111 (Path.expanduser fails for unknown users)
+    return kind, Path(path) if kind in _PATHS and path else None
 
 
 def hidden_places(environment: Mapping[str, str], homes: Sequence[Path], *, is_root: bool) -> tuple[str, ...]:
@@ -180,7 +181,7 @@ def read_told(data: bytes) -> Told:
             case b"p":
                 refused.append("tried to change the settings of another process, which was refused")
             case b"f":
-                refused.append("tried to start more than 256 processes or 8192 threads")
+                refused.append(f"tried to start more than {path}")
     shown = first_few(refused, _SHOWN_REFUSALS, between="; it ")
     return Told("; ".join(causes), f"the FMU {shown}" if shown else "", enforced)
 

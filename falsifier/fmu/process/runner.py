@@ -71,8 +71,8 @@ class Runner:
             except (ModelError, SimulationError):
                 raise failure from None
             repeated = self._simulate(speaking, plan, given)
-            if is_reused and reuse is not None:
-                self._distrust(reuse)
+            if is_reused:
+                self._distrust(reuse or "instance")  # as after a first simulation too long to be repeated
             return repeated
 
     def load(self, plan: Plan) -> None:
@@ -174,6 +174,9 @@ class Runner:
         if self._worker is not None and not self._worker.program.is_alive:  # since its last simulation
             self._drop()
         worker = self._worker
+        if worker is not None and worker.plan and worker.plan is not plan and worker.plan.names - plan.names:
+            self._drop()  # a reset that was tested with the same values may keep those that are set no more
+            worker = None
         if worker is None:
             logging = self._order.logging
             worker = Worker(self._workplace(), self._order, self.reuse, self.untrusted, logging=logging)

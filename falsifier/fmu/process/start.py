@@ -19,7 +19,7 @@ from falsifier.core import posix, posix_files
 from falsifier.core.literals import printable
 from falsifier.errors import ModelError, remedy
 from falsifier.fmu.description.archive import OLD_PLATFORMS, this_platform
-from falsifier.fmu.description.libraries import find_wine, windows_path
+from falsifier.fmu.description.libraries import HOW_TO_INSTALL, find_wine, windows_path
 from falsifier.fmu.process.rights import Rights, encoded, hidden_places
 from falsifier.fmu.process.workplace import Workplace, worker_environment
 
@@ -37,6 +37,8 @@ _OVERRIDES = "wineboot.exe,services.exe,explorer.exe,winemenubuilder.exe,mscoree
 _WRITTEN_IN_PYTHON = ("*/resources/slavemodule.txt", "*/resources/*/resources/slavemodule.txt")
 # The folders in which the system looks first for the libraries that a library needs.
 _LIBRARY_PATH = "LD_LIBRARY_PATH"
+# A process that may start no other one, or open no more files, ends with this code (guard.c).
+_CANNOT_START, _LIMITED = 71, "; end other processes, or raise the limits (ulimit -u, ulimit -n)"
 # The parts of the system's C library, which fit no other version of it.
 _OF_C_LIBRARY = re.compile(
     r"(ld-.+|lib(c|m|mvec|dl|rt|util|pthread|thread_db|anl|resolv|BrokenLocale|nss_\w+))\.so\.\d+|libnsl\.so\.1"
@@ -129,6 +131,7 @@ class Started:
         if through_wine:
             command = (str(find_wine()), windows_path(workplace.program(windows=True)))
         self._scratch = scratch = workplace.scratch()
+        self._through_wine = through_wine
         self._code: int | None = None
         self.exception: int | None = None  # of Windows, which has ended it, if it has told one
         self.output = Output()  # what it prints
@@ -163,6 +166,12 @@ class Started:
             self._code = code if exception is None else -_SIGNALS.get(exception, -(exception & 0xFF))
             self._close()
         return self._code
+
+    def not_started(self) -> ModelError:
+        """End a process that does not answer; return the error that says so."""
+        code, needed = self.end(), f"; a Wine for 64-bit programs is needed: {HOW_TO_INSTALL}"
+        hint = needed if self._through_wine else _LIMITED if code == _CANNOT_START else ""
+        return ModelError(f"the program that runs FMUs does not start ({posix.exit_text(code)}){hint}")
 
     def _close(self) -> None:
         self.output.file.close()

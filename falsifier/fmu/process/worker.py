@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from falsifier.core.posix import exit_text
-from falsifier.errors import ModelError
-from falsifier.fmu.description.libraries import HOW_TO_INSTALL
 from falsifier.fmu.process.connection import QUICK_SECONDS, Garbled, Reply, Request, Where, receive, send
 from falsifier.fmu.process.encoding import integers, reals, text
 from falsifier.fmu.process.order import Order
@@ -23,8 +21,6 @@ from falsifier.fmu.process.workplace import Workplace
 
 # A process that could not send its reply ends with this code (main.c); one that is going to end does so soon.
 _CUT_OFF, _ENDING_SECONDS = 74, 0.2
-# A process that may start no other one, or open no more files, ends with this code (guard.c).
-_CANNOT_START, _LIMITED = 71, "; end other processes, or raise the limits (ulimit -u, ulimit -n)"
 # Wine on a busy machine.
 _STARTING_SECONDS = 120.0
 
@@ -132,11 +128,7 @@ class Worker(Started):
             send(self.program, Request.CONNECT, text(self.connect))
             self.receive(_STARTING_SECONDS)
         except (ConnectionError, TimeoutError) as error:
-            needed = f"; a Wine for 64-bit programs is needed: {HOW_TO_INSTALL}"
-            code = self.end()
-            hint = needed if self._order.through_wine else _LIMITED if code == _CANNOT_START else ""
-            why = f"the program that runs FMUs does not start ({exit_text(code)}){hint}"
-            raise ModelError(why) from error
+            raise self.not_started() from error
         # The worker tells there which component it loads.
         self.memory.fit(HEADER)
         send(self.program, Request.LOAD, self._load)

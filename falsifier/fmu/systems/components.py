@@ -162,10 +162,13 @@ def merged(
     return Description(info, "", {}, slots), places
 
 
-def location(members: Sequence[Member], place: Place) -> tuple[int, int, int]:
-    """Return what all names of a variable of a component have in common: where its value is."""
+def location(members: Sequence[Member], place: Place) -> tuple[int, str, int, int]:
+    """Return what all names of a variable of a component have in common: where its value is.
+
+    In FMI 2, a reference belongs to a type: a real and an integer may have the same.
+    """
     slot = members[place.member].description.slots[place.name]
-    return place.member, slot.reference, slot.offset
+    return place.member, slot.type, slot.reference, slot.offset
 
 
 def _description(members: Sequence[Member], links: Sequence[Link]) -> str:

@@ -115,17 +115,14 @@ def _reached(start: int, before: Sequence[set[int]]) -> set[int]:
 
 
 def late_links(
-    links: Iterable[Link], order: Sequence[int], loops: Sequence[tuple[int, int]] = ()
+    links: Iterable[Link], order: Sequence[int], loops: Sequence[tuple[int, int]]
 ) -> Iterator[Link]:
-    """Yield the connections whose target steps before their source, except for those that are iterated."""
+    """Yield the connections of components whose target steps before their source, unless both iterate."""
     position = {member: k for k, member in enumerate(order)}
     for link in links:
-        if link.source.member != SYSTEM:
-            ends = position[link.source.member], position[link.target.member]
-            if ends[1] <= ends[0] and not any(
-                first <= min(ends) and max(ends) < last for first, last in loops
-            ):
-                yield link
+        ends = position[link.source.member], position[link.target.member]
+        if ends[1] <= ends[0] and not any(first <= min(ends) and max(ends) < last for first, last in loops):
+            yield link
 
 
 def _predecessors(

@@ -5,14 +5,18 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from falsifier.core.arguments import instance
 from falsifier.core.experiment import Experiment
 from falsifier.core.model import ModelInfo
 from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.errors import SpecError
-from falsifier.fmu.process.network import Coupling, Network
+from falsifier.fmu.process.network import SYSTEM, Coupling, Network
 from falsifier.fmu.process.order import Order, own_steps
+from falsifier.fmu.process.plan import held_pieces
 from falsifier.fmu.process.registry import Isolated, simulate
 from falsifier.fmu.systems.components import Component, Connection, Frame
 from falsifier.fmu.systems.wiring import make_network
@@ -122,8 +126,19 @@ class System(Isolated):
             if variable.name not in signals:
                 start = numbers.pop(variable.name, variable.start_number or 0.0)
                 driven[variable.name] = Signal((0.0,), (start,), "constant")
-        tables = {name: signal.pieces(experiment.stop_time) for name, signal in driven.items()}
+        tables = {name: self._pieces(name, signal, experiment) for name, signal in driven.items()}
         return simulate(self.order, experiment, tables, numbers)
+
+    def _pieces(self, name: str, signal: Signal, experiment: Experiment) -> NDArray[np.float64]:
+        """Return an input as piecewise cubics; for a solver, a discrete one changes in steps."""
+        pieces, variable, members = signal.pieces(experiment.stop_time), self.info[name], self.network.members
+        owner = self.network.places[name].member
+        fed = members if owner == SYSTEM else (members[owner],)
+        is_solved = any(member.interface == "model-exchange" for member in fed)
+        if variable.is_continuous or not is_solved or not pieces[:, 2:].any():
+            return pieces
+        points = np.linspace(0.0, experiment.stop_time, round(experiment.stop_time / experiment.step) + 1)
+        return held_pieces(signal, points, whole=variable.kind != "real")
 
     def check_steps(self, experiment: Experiment) -> None:
         """Check that own steps are multiples of the step; SpecError naming component and what fits."""

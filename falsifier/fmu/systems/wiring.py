@@ -51,7 +51,8 @@ def make_network(
             _check_restorable([members[m] for m in order[first:last]])
     else:
         order = step_order(len(members), links, dependencies)
-    late = links if coupling.method == "jacobi" else tuple(late_links(links, order, loops))
+    between = [link for link in links if link.source.member != SYSTEM]
+    late = between if coupling.method == "jacobi" else late_links(between, order, loops)
     names = [members[m].name for m in order]
     notes = [_order_note(names, list(dict.fromkeys(full_name(members, link.target) for link in late)))]
     for together in (names[first:last] for first, last in loops):
@@ -107,7 +108,7 @@ class _Joiner:
     ) -> None:
         self._inputs = {v.name: v for v in frame.inputs}
         self._members, self._structures, self._coupling = members, structures, coupling
-        self._fed: dict[tuple[int, int, int], str] = {}
+        self._fed: dict[tuple[int, str, int, int], str] = {}
         self.links: list[Link] = []
         self.notes: list[str] = []
 

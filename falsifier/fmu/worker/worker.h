@@ -79,7 +79,7 @@ struct call {
     size_t size;
 };
 
-/* Where the value of one variable is: storage type (the position in ports.STORAGE), address, and sign. */
+/* Where the value of one variable is: storage type (the position in encoding.STORAGE), address, and sign. */
 struct place {
     int storage, is_boolean;
     double sign;

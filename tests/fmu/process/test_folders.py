@@ -6,6 +6,7 @@ import pytest
 
 from falsifier.fmu.process.start import _DROPPED, _MOST_BYTES, Output
 from falsifier.fmu.process.workplace import WorkFolder, sweep
+from tests.fmu import fixtures
 
 
 @pytest.fixture(autouse=True)
@@ -19,6 +20,12 @@ def test_a_folder_is_removed_with_its_lock(temporary: Path) -> None:
     (folder.path / "a" / "b").mkdir(parents=True)
     folder.remove()
     assert list(temporary.iterdir()) == []
+
+
+def test_the_folder_may_have_any_name(temporary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (odd := temporary / os.fsdecode(b"\xff")).mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(odd))
+    assert fixtures.run(fixtures.isolated("Lag_2"), ("x",))["x"][-1] == 0.0
 
 
 def test_a_folder_whose_owner_lives_is_not_swept() -> None:

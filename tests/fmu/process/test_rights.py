@@ -48,7 +48,7 @@ def test_what_was_refused_is_told_with_the_way_out() -> None:
     assert "allow=['write:/my logs']" in read_told(b"w/my logs/x\0").refusals
     # A file without a name in a folder that exists: advice for what is above would allow too much.
     assert "allow=['write:/usr']" in read_told(b"w/usr\0").refusals
-    assert "threads" in read_told(b"f\0").refusals
+    assert "more than 9 processes" in read_told(b"f9 processes\0").refusals
     assert "\x1b" not in read_told(b"w/\x1b[2J\xff\0").refusals
     assert read_told(b"r/bin/true\0").cause.endswith("/bin/true")
     assert read_told(b"") == read_told(b"?unknown\0")

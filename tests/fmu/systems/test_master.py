@@ -126,6 +126,18 @@ def test_an_output_that_is_nan_at_time_0_is_named_and_not_the_loop_that_it_sprea
     assert np.isfinite(run(model, "plant.x", parameters={"pi.k": 0.5})["plant.x"]).all()
 
 
+@pytest.mark.parametrize("coupling", [Coupling(), Coupling("jacobi"), Coupling(loops="iterate")])
+def test_an_output_may_be_infinite(coupling: Coupling) -> None:
+    """As the time to a collision is that of a car that stands; a value that is not recorded may be so."""
+    model = system({"far": "Gain_2", "b": "Gain_2", "plant": "Plant_2"}, {"b.measured": "far.y"}, coupling)
+    found = run(model, "plant.x", parameters={"far.k": 1e200, "far.r": 1e200})
+    assert np.isfinite(found["plant.x"]).all()
+    ring = {"a.measured": "b.y", "b.measured": "c.y", "c.measured": "a.y"}
+    model = system(dict.fromkeys("abc", "Gain_2"), ring, DELAY)
+    with pytest.raises(SimulationError, match="does not converge"):
+        run(model, "a.y", parameters={"a.k": 1e80, "b.k": 1e80, "c.k": 1e80})
+
+
 @pytest.mark.parametrize("method", ["gauss-seidel", "jacobi"])
 def test_an_output_that_is_nan_after_the_initialisation_is_named_and_not_the_component_that_receives_it(
     method: Method,

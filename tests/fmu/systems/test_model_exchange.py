@@ -1,12 +1,14 @@
 """Components of model exchange against what the single FMU and the equations say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from falsifier.core.model import Interface
-from falsifier.core.signals import Signal
+from falsifier.core.signals import Interpolation, Signal
 from falsifier.errors import SimulationError
-from falsifier.fmu import Component, Connection, Coupling
+from falsifier.fmu import Component, Connection, Coupling, Frame, System
 from tests.fmu import fixtures
 from tests.fmu.fixtures import ME, ramp
 from tests.fmu.small_systems import LOOP, run, sampled_loop, solved, system
@@ -47,6 +49,16 @@ def test_time_events_are_met_within_a_step(name: str) -> None:
         found["ticker.sampled"], [samples[k] for k in (0, 0, 0, 1, 1, 2, 2, 2, 3, 3, 4)]
     )
     assert found["ticker.x"][-1] == pytest.approx(0.5 * sum(samples[:4]))
+
+
+@pytest.mark.parametrize("interpolation", ["linear", "pchip"])
+def test_discrete_inputs_follow_a_signal_in_steps_as_in_a_single_fmu(interpolation: Interpolation) -> None:
+    signal, alone = Signal((0.0, 1.0), (0.0, 10.0), interpolation), fixtures.isolated("Echo_3me", ME)
+    expected = fixtures.run(alone, ("out_Int32",), signals={"in_Int32": signal})["out_Int32"].tolist()
+    parts, frame = {"a": solved("Echo_3me")}, Frame((replace(alone.info["in_Int32"], name="w"),))
+    whole = System(parts, {"a.in_Int32": "w"}, frame=frame)
+    for model, name in ((system(parts, {}), "a.in_Int32"), (whole, "w")):
+        assert run(model, "a.out_Int32", signals={name: signal})["a.out_Int32"].tolist() == expected
 
 
 @pytest.mark.parametrize("name", ["Ball_2", "Ball_3"])

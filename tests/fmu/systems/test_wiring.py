@@ -12,7 +12,7 @@ from falsifier.errors import ModelError, SimulationError, SpecError
 from falsifier.fmu import Component, Connection, Coupling, Frame, System
 from falsifier.fmu.description import libraries
 from falsifier.fmu.process.connection import Reply, Where
-from falsifier.fmu.process.outcome import failure
+from falsifier.fmu.process.outcome import failure, last_lines
 from falsifier.fmu.process.plan import make_plan
 from tests.fmu import fixtures
 from tests.fmu.small_systems import LOOP, solved, system
@@ -100,6 +100,19 @@ def test_an_output_may_feed_several_inputs_and_arrays_go_element_by_element() ->
     assert found.info.connections == (("a.y[1]", "b.u[1]"), ("a.y[2]", "b.u[2]"), ("a.y[2]", "c.u"))
 
 
+def test_variables_of_two_types_may_have_the_same_reference(tmp_path: Path) -> None:
+    """As OpenModelica writes them: FMI 2 counts the references of each type by themselves."""
+    fmu = fixtures.altered(
+        fixtures.path("Echo_2"),
+        tmp_path / "e.fmu",
+        lambda xml: xml.replace(b'"in_Integer" valueReference="1"', b'"in_Integer" valueReference="0"'),
+    )
+    parts: dict[str, str | Component] = {"a": "Echo_2", "b": Component(fmu)}
+    links = {"b.in_Real": "a.out_Real"}
+    assert "b.in_Integer" in [v.name for v in system(parts, links).info.inputs]
+    assert len(system(parts, {**links, "b.in_Integer": "a.out_Integer"}).network.links) == 2
+
+
 @pytest.mark.parametrize("name", ["Lag_2", "Stiff_2"], ids=["co-simulation", "model exchange"])
 def test_components_with_a_windows_library_only_are_refused(name: str) -> None:
     path = fixtures.FOLDER / "win64" / f"{name}.fmu"
@@ -175,6 +188,8 @@ def test_an_input_of_the_whole_closes_no_loop() -> None:
     fmus = {name: fixtures.path("Gain_2") for name in ("first", "last")}
     found = System(fmus, links, coupling=Coupling(loops="iterate"), frame=frame)
     assert found.network.loops == () and order(found) == ["first", "last"]
+    found = System(fmus, {"first.r": "r"}, coupling=Coupling("jacobi"), frame=frame)
+    assert found.info.notes[0] == "components step in the order first, last", "it is not late either"
 
 
 MODEL = system({"table": "Table_3", "plant": "Lead_2", "pi": "Gain_2"}, LOOP, Coupling(loops="iterate"))
@@ -208,6 +223,12 @@ def test_a_refused_first_step_tells_its_size() -> None:
     assert "the step returned error at t = 0.5 s" in str(later)
     pending = failure(MODEL.network, PLAN, Reply(Where.STEPPING, 5, time=0.0, component=0), "", ())
     assert "in the background are not supported" in str(pending) and "step_size" not in str(pending)
+
+
+def test_of_a_panic_its_reason_is_told_and_not_the_calls_that_led_there() -> None:
+    panic = ("thread '<unnamed>' panicked at src/lib.rs:42:9:", "the tank is empty", "stack backtrace:")
+    log = ("started", *panic, *(f"  {k}: std::panicking" for k in range(20)), "aborting")
+    assert last_lines(log) == f"; its last messages: {'; '.join(panic)}"
 
 
 def test_a_refused_first_step_names_the_option_that_there_is(at_the_command_line: None) -> None:

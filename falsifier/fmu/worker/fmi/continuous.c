@@ -213,7 +213,8 @@ struct outcome settle_events(struct solver *s)
 /* Get derivatives and indicators at the current time and state. */
 struct outcome refresh(struct solver *s)
 {
-    struct outcome o = checked(derive(s, s->time, s->x, s->stages[0]), STEPPING);
+    unsigned status = derive(s, s->time, s->x, s->stages[0]);
+    struct outcome o = checked(status, status == 2 ? TOO_SMALL : STEPPING); /* discarded, or not finite */
     s->jacobian_known = 0;
     return o.where == DONE ? checked(get_indicators(s, s->z), EVENT) : o;
 }

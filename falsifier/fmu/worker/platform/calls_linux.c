@@ -491,7 +491,9 @@ static int answer(const struct seccomp_notif *asked, const struct policy *policy
     const int is_thread = asked->data.nr == __NR_clone && asked->data.args[0] & CLONE_THREAD;
     if (is_thread ? may_start_thread() : may_start_another())
         return GO_ON;
-    tell(FORK, "");
+    char most[64];
+    snprintf(most, sizeof most, "%d processes or %d threads", MOST_PROCESSES, MOST_THREADS);
+    tell(FORK, most);
     return EAGAIN;
 }
 

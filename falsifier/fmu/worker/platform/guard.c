@@ -41,12 +41,13 @@ static void wake_up(int number)
     errno = before;
 }
 
-/* Each thing is told once. */
+/* Each thing is told once, and what ended the process also after much that was refused. */
 void tell(enum told what, const char *path)
 {
-    static char *told[MOST_TOLD];
+    static char *told[MOST_TOLD + 2];
     static size_t count;
-    char *text = count < MOST_TOLD ? malloc(strlen(path) + 2) : NULL;
+    const size_t most = what == REPLACE || what == MEMORY ? MOST_TOLD + 2 : MOST_TOLD;
+    char *text = count < most ? malloc(strlen(path) + 2) : NULL;
     if (!text)
         return;
     text[0] = (char)what;

@@ -26,7 +26,7 @@ enum enforced {
     REFUSALS = 8      /* what is refused is told; without FILES, that is also what refuses it */
 };
 
-/* What the guard tells: one letter, then a path or nothing. First it tells what is enforced, as one more letter. */
+/* What the guard tells: one letter, then a path, how many there may be, or nothing. First it tells what is enforced, as one more letter. */
 enum told {
     ENFORCED = 'e',
     CHANGE = 'w', /* refused */

@@ -145,8 +145,9 @@ int store_signals(struct component *c, double time)
     return is_missing;
 }
 
-/* Whether a connected output has changed since the round before. */
+/* Whether a connected output has changed since the round before; one that stays infinite has not. */
 int moves(const struct signal *s, double tolerance)
 {
-    return !(fabs(s->value - s->tried) <= tolerance * fmax(1.0, fabs(s->value)));
+    double change = fabs(s->value - s->tried);
+    return s->value != s->tried && !(isfinite(s->value) && change <= tolerance * fmax(1.0, fabs(s->value)));
 }
