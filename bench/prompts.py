@@ -23,11 +23,11 @@ from falsifier.evaluation.evaluate import Evaluation, evaluate
 from falsifier.llm.messages import Message
 from falsifier.llm.prompts import VARIANTS, View
 from falsifier.llm.prompts.numbers import coarse_clock
-from falsifier.llm.prompts.observations import (
+from falsifier.llm.prompts.observations import observed
+from falsifier.llm.prompts.told_courses import (
     CLOSE_TOLERANCE,
     close_up_times,
     compared_columns,
-    observed,
     told_accuracy,
 )
 from falsifier.llm.usage import count_tokens

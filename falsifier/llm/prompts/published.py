@@ -15,8 +15,8 @@ from falsifier.core.words import counted
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import bounds, chosen, decimals_for
-from falsifier.llm.prompts.observations import compared_columns
 from falsifier.llm.prompts.standing import INTERPOLATION_WORDS, reply_form, requirement_text
+from falsifier.llm.prompts.told_courses import compared_columns
 from falsifier.llm.prompts.view import Variant, View
 from falsifier.stl.formula import Formula
 
