@@ -1,7 +1,7 @@
 """Everything observed in one sample: what broke or decided it, parts of the formula, signals over time."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from math import inf
@@ -9,7 +9,7 @@ from math import inf
 import numpy as np
 
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import in_unit, listed
+from falsifier.core.words import counted, in_unit, listed
 from falsifier.evaluation.evaluate import Evaluation, compiled
 from falsifier.llm.prompts import courses
 from falsifier.llm.prompts.courses import Array
@@ -25,7 +25,7 @@ from falsifier.llm.prompts.told_courses import (
 )
 from falsifier.llm.prompts.view import View
 from falsifier.stl import Diagnosis, Formula, Verdict
-from falsifier.stl.diagnosis import links
+from falsifier.stl.diagnosis import VacuousImplication, links
 from falsifier.stl.formula import And, Iff, Implies, Or
 from falsifier.stl.margins import shown, signed
 
@@ -78,7 +78,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     over_time = monitor.courses(trajectory)
     is_timed = any(np.ptp(trajectory[name]) > 0 for name in diagnosis.path[-1].formula.signals)
     reasons = tuple(_reasons(verdict, diagnosis, is_timed=is_timed))
-    told_parts = tuple(_parts(view, diagnosis, over_time))
+    told_parts = tuple(_parts(view, diagnosis, over_time, is_timed=is_timed))
     parts = tuple(text for text, _ in told_parts)
     there = (_values_at(view, trajectory, verdict.critical_time, verdict.robustness),) if is_timed else ()
     predicates = [
@@ -118,7 +118,17 @@ def _reasons(verdict: Verdict, diagnosis: Diagnosis, *, is_timed: bool) -> Itera
     path = "; ".join(above) + ": " * bool(above)
     decider = _MARGIN.sub("", decider)
     decided = f"{path}{decider}" if is_timed else f"{decider} at all times"
-    yield " ".join((f"why: {decided}.", *(v.text for v in diagnosis.vacuities)))
+    yield " ".join((f"why: {decided}.", *_vacuous(diagnosis.vacuities)))
+
+
+def _vacuous(found: Sequence[VacuousImplication]) -> Iterator[str]:
+    """Which implications had a condition that was never true, each condition once."""
+    alike: dict[object, list[VacuousImplication]] = {}
+    for one in found:
+        alike.setdefault((one.implication.left, one.window, one.only), []).append(one)
+    for first, *others in alike.values():
+        also = f" It is the condition of {counted(len(others), 'other implication')}, too." if others else ""
+        yield f"{first.text}{also}"
 
 
 def _discrete(view: View, inside: Trajectory) -> Iterator[str]:
@@ -149,6 +159,8 @@ def _nearest(view: View, trajectory: Trajectory, over_time: Mapping[Formula, Arr
     clock = fine_clock(view)
     violation = Side(view.requirement.formula, must_hold=False)
     for met, missing, sample in near_misses(violation, trajectory.times, over_time):
+        if all(_is_still(over_time[side.part]) for side in missing):
+            continue  # it is as near at all times
         words = []
         for side in missing:
             gaps, found = asked_for(side, trajectory.times, over_time, np.array([sample]))
@@ -161,14 +173,27 @@ def _nearest(view: View, trajectory: Trajectory, over_time: Mapping[Formula, Arr
         yield f"nearest to a violation while {listed([*map(str, met)])}, at t = {time} s: {'; '.join(words)}"
 
 
-def _parts(view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array]) -> Iterator[tuple[str, str]]:
-    """Robustness of both sides of every connective on the path to what decided; the same in numbers alone."""
+def _is_still(column: Array) -> bool:
+    """Whether robustness is the same at several times, and asked for at no other."""
+    asked = column[~np.isnan(column)]
+    return len(asked) > 1 and float(np.ptp(asked)) == 0
+
+
+def _parts(
+    view: View, diagnosis: Diagnosis, over_time: Mapping[Formula, Array], *, is_timed: bool
+) -> Iterator[tuple[str, str]]:
+    """Robustness of both sides of every connective on the path to what decided; the same in numbers alone.
+
+    Not of an implication where what decided is the same at all times: at which of these it did is chance.
+    """
     above: type[Formula] | None = None
     for step in diagnosis.path:
         kind = type(step.formula)
         is_link = kind is above and kind in (And, Or)  # its chain was shown already, at the first link
         above = kind
         if is_link or not isinstance(step.formula, And | Or | Implies | Iff):
+            continue
+        if not is_timed and isinstance(step.formula, Implies | Iff):
             continue
         sides = links(step.formula) if isinstance(step.formula, And | Or) else step.formula.children
         sample = round(step.time / view.experiment.output_interval)
@@ -230,4 +255,6 @@ def _rarer(trajectory: Trajectory, margin: Array, clock: int) -> str:
         return f"{word} only at {begin} s"
     if round((stretch[1] - stretch[0]) / step) + 1 == rare.sum():
         return f"{word} only from {begin} to {end} s"
-    return f"{word} for about {number(float(rare.sum()) * step)} s in total, longest from {begin} to {end} s"
+    total, first = number(float(rare.sum()) * step), float(trajectory.times[int(rare.argmax())])
+    since = f"first at {plain(first, clock)} s, " * (first < stretch[0])
+    return f"{word} for about {total} s in total, {since}longest from {begin} to {end} s"

@@ -102,6 +102,20 @@ def test_of_a_predicate_nothing_is_told_of_times_at_which_it_does_not_count() ->
     assert line(lines, "x <= 0.5, ") == f"x <= 0.5, from 0 to 10 s where it counts: {told}"
 
 
+def test_when_something_was_false_first_is_told_where_another_time_was_longer() -> None:
+    x = np.where((np.abs(TIMES - 2.5) < 0.6) | (TIMES >= 7), 1.0, 0.0)
+    lines = facts(*seen("G[0,10] (x <= 0.5 and u <= 1)", x + TIMES / 100))
+    assert line(lines, "x <= 0.5, ").endswith("in total, first at 2 s, longest from 7 to 10 s")
+
+
+def test_a_condition_that_was_never_true_is_told_once() -> None:
+    both = "(x > 5 -> u <= 1) and (x > 5 -> u <= 2)"
+    lines = facts(*seen(f"G[0,10] ({both})", np.minimum(TIMES / 4, 1.5)))
+    assert line(lines, "why: ").endswith("It is the condition of 1 other implication, too.")
+    lines = facts(*seen("G[0,10] (x > 5 -> u <= -1)", 0 * TIMES))
+    assert not [each for each in lines if each.startswith(("condition", "nearest"))], "the same at all times"
+
+
 def test_both_sides_of_the_connectives_on_the_way_are_told() -> None:
     lines = facts(*seen("G[0,10] (x <= 11) and (F[0,10] (x >= 3) or G[0,10] (u >= 1))", TIMES.copy()))
     assert "G[0,10] (x <= 11) robustness +1 m" in line(lines, "conjuncts at t = 0 s: ")
