@@ -105,7 +105,7 @@ def test_of_a_predicate_nothing_is_told_of_times_at_which_it_does_not_count() ->
 def test_when_something_was_false_first_is_told_where_another_time_was_longer() -> None:
     x = np.where((np.abs(TIMES - 2.5) < 0.6) | (TIMES >= 7), 1.0, 0.0)
     lines = facts(*seen("G[0,10] (x <= 0.5 and u <= 1)", x + TIMES / 100))
-    assert line(lines, "x <= 0.5, ").endswith("in total, first at 2 s, longest from 7 to 10 s")
+    assert line(lines, "x <= 0.5, ").endswith("in total, first at 1.9 s, longest from 7 to 10 s")
 
 
 def test_a_condition_that_was_never_true_is_told_once() -> None:
