@@ -4,7 +4,7 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from itertools import chain
+from itertools import chain, islice
 from math import inf
 
 import numpy as np
@@ -12,10 +12,12 @@ import numpy as np
 from falsifier.core.trajectory import Trajectory
 from falsifier.llm.prompts.courses import Array, jumps
 from falsifier.llm.prompts.numbers import column_decimals, plain, value_text
+from falsifier.llm.prompts.told_courses import compared_columns
 from falsifier.llm.prompts.view import View
 
-# Changes that are told, and the conditions of one; recorded signals and inputs that are looked at.
-_MOST_TOLD, _MOST_CONDITIONS, _MOST_RECORDED, _MOST_INPUTS = 6, 4, 24, 12
+# Changes that are told, and the conditions of one; recorded signals and inputs that are looked at, and what
+# is compared of several signals.
+_MOST_TOLD, _MOST_CONDITIONS, _MOST_RECORDED, _MOST_INPUTS, _MOST_COMPARED = 6, 4, 24, 12, 8
 # A condition is a range, or two, as narrow as this share of all values, in which a signal is for no more than
 # this share of the time, and in which some signal would be each time by chance with no more than this
 # probability.
@@ -31,10 +33,13 @@ _CHATTERS = 200
 # Times of a sample that are looked at for the values that signals have.
 _TIMES = 100
 
-_JUMPS = "jumps"  # what a signal that is not discrete does
+_JUMPS, _STARTS = "jumps", "starts to move"  # what a signal that is not discrete does
+# It starts if it rested for this share of the time at which the requirement looks.
+_REST = 0.03
 _HEAD = (
-    "So far, signals just before each change of a discrete signal, or jump of another one, and inputs at "
-    "that time or until then, were as follows; what samples with the same beginning share counts once:"
+    "So far, signals just before each change of a discrete signal, or jump or start of another one, and "
+    "inputs at that time or until then, were as follows; what samples with the same beginning share counts "
+    "once:"
 )
 # What is told of a signal: its value, that of an input that may just have changed, how long it had its value.
 _VALUE, _UNTIL, _UNCHANGED = (
@@ -60,32 +65,39 @@ class Regularities:
     def add(self, trajectory: Trajectory) -> None:
         """Add a sample."""
         inside = self.view.inside(trajectory)
-        if not inside.columns.keys() >= set(self._names):
+        columns = {**inside.columns, **compared_columns(self.view, inside)}
+        if not columns.keys() >= set(self._names):
             return
-        values, times = np.stack([inside[name] for name in self._names]), inside.times
+        values, times = np.stack([columns[name] for name in self._names]), inside.times
         changed = np.diff(values, axis=1, prepend=values[:, :1]) != 0
         since = np.maximum.accumulate(changed * np.arange(len(times)), axis=1)
         unchanged = times - np.roll(times[since], 1, axis=1)
         unchanged[:, 0] = 0.0
-        before, first = np.roll(values, 1, axis=1), len(self._recorded)  # of the inputs
+        before, first = np.roll(values, 1, axis=1), len(self._names) - len(self._inputs)
         known = np.vstack((values, values[first:], unchanged))
         self._known.append(known[:, :: max(1, len(inside) // _TIMES)])
         then = np.vstack((before[:first], values[first:], before[first:], unchanged, times))
         rows = then.T + 0.0  # there are two zeros, with other bytes
         discrete = self.view.discrete(inside)
-        for name in self._recorded:
+        for place, name in enumerate(self._recorded):
             column = inside[name]
-            changes = np.flatnonzero(np.diff(column)) + 1 if name in discrete else jumps(column)
-            changes = changes if name in discrete else changes[changes > 1]  # an output may begin anywhere
-            if len(changes) > _CHATTERS:
+            if name in discrete:
+                changes = {"": np.flatnonzero(changed[place])}
+            else:
+                rested = changed[place] & (unchanged[place] >= _REST * times[-1])
+                found = jumps(column)
+                changes = {_STARTS: np.setdiff1d(np.flatnonzero(rested), found)}
+                changes[_JUMPS] = found[found > 1]  # an output may begin anywhere
+            if sum(map(len, changes.values())) > _CHATTERS:
                 self._chattering.add(name)
             if name in self._chattering:
                 continue
-            pairs = list(zip(column[changes - 1].tolist(), column[changes].tolist(), strict=True))
-            ends = {v: value_text(self.view, name, v) for v in {*chain(*pairs)} if name in discrete}
-            for (old, new), row in zip(pairs, rows[changes], strict=True):
-                change = f"{ends[old]} -> {ends[new]}" if ends else _JUMPS
-                self._seen[name][change, new > old][row.tobytes()] = None
+            for change, at in changes.items():
+                pairs = list(zip(column[at - 1].tolist(), column[at].tolist(), strict=True))
+                ends = {v: value_text(self.view, name, v) for v in {*chain(*pairs)} if not change}
+                for (old, new), row in zip(pairs, rows[at], strict=True):
+                    told = change or f"{ends[old]} -> {ends[new]}"
+                    self._seen[name][told, new > old][row.tobytes()] = None
 
     @property
     def text(self) -> str:
@@ -93,7 +105,7 @@ class Regularities:
         names = (n for n in self._recorded if n in self._seen and n not in self._chattering)
         known = np.concatenate(self._known, axis=1) if self._known else np.empty(0)
         lines = [line for name in names for line in self._of(name, known)]
-        lines.sort(key=lambda line: f" {_JUMPS} " in line)
+        lines.sort(key=lambda line: f" {_JUMPS} " in line or f" {_STARTS} " in line)
         return "\n".join((_HEAD, *lines[:_MOST_TOLD])) if lines else ""
 
     @cached_property
@@ -102,24 +114,30 @@ class Regularities:
 
     @cached_property
     def _names(self) -> tuple[str, ...]:
-        """Signals that are told, then inputs."""
-        inputs = [r.name for r in self.view.space.inputs if r.name not in self._recorded]
-        return (*self._recorded, *inputs[:_MOST_INPUTS])
+        """Signals that are told, what is compared of several, then inputs."""
+        compared = (text for text, side in self.view.compared.items() if len(side.signals) > 1)
+        return (*self._recorded, *islice(compared, _MOST_COMPARED), *self._inputs)
+
+    @cached_property
+    def _inputs(self) -> tuple[str, ...]:
+        names = (r.name for r in self.view.space.inputs if r.name not in self._recorded)
+        return tuple(islice(names, _MOST_INPUTS))
 
     @cached_property
     def _told(self) -> tuple[tuple[str, str], ...]:
         """What is looked at at each change: of which signal, and how it is told."""
-        inputs = self._names[len(self._recorded) :]
-        forms = ((self._names, _VALUE), (inputs, _UNTIL), (self._names, _UNCHANGED))
+        forms = ((self._names, _VALUE), (self._inputs, _UNTIL), (self._names, _UNCHANGED))
         return tuple((name, form) for names, form in forms for name in names)
 
     def _of(self, name: str, known: Array) -> Iterator[str]:
         counts = len(self._seen[name]) >= _COUNTS
         # It may have looked discrete in other samples.
-        is_real = any(change == _JUMPS for change, _ in self._seen[name])
+        is_real = any(change in (_JUMPS, _STARTS) for change, _ in self._seen[name])
         changes: defaultdict[str, dict[bytes, None]] = defaultdict(dict)
         for (change, is_up), found in self._seen[name].items():
-            way = f"{f'{_JUMPS} ' * is_real}{'up' if is_up else 'down'}"
+            way = "up" if is_up else "down"
+            if is_real:
+                way = f"{_STARTS if change == _STARTS else _JUMPS} {way}"
             changes[way if is_real or counts else change] |= found
         for change, found in changes.items():
             seen = np.frombuffer(b"".join(found)).reshape(len(found), -1)[:, :-1]

@@ -75,6 +75,14 @@ def test_how_long_an_input_had_its_value_and_which_where_it_changes_at_the_same_
     assert seen.text.endswith("- x 0 -> 1, 4 times: u 0.25 until then, u unchanged for 1 s")
 
 
+def test_when_a_signal_that_rested_starts_and_what_was_compared_then() -> None:
+    seen, times = Regularities(View.of(lag_problem("G (x - u <= 0.9)"))), np.linspace(0.0, 10.0, 101)
+    for rest, start in enumerate((2.05, 3.05, 5.05)):
+        columns = {"x": rest + np.maximum(times - start, 0.0), "u": rest + times - start - 4}
+        seen.add(Trajectory(times, columns))
+    assert "- x starts to move up, 3 times: x - u 4.05" in seen.text
+
+
 def test_what_was_so_in_samples_with_the_same_beginning_was_so_once() -> None:
     view = replace(
         View.of(lag_problem("G (x <= 0.9)")), info=ModelInfo("m", variables=(Variable("x", kind="integer"),))
