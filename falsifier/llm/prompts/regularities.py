@@ -1,7 +1,7 @@
 """What signals were each time that a discrete signal changed, which tells of thresholds and conditions."""
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import chain, islice
@@ -17,7 +17,7 @@ from falsifier.llm.prompts.view import View
 
 # Changes that are told, and the conditions of one; recorded signals and inputs that are looked at, and what
 # is compared of several signals.
-_MOST_TOLD, _MOST_CONDITIONS, _MOST_RECORDED, _MOST_INPUTS, _MOST_COMPARED = 6, 4, 24, 12, 8
+_MOST_TOLD, _MOST_CONDITIONS, _MOST_RECORDED, _MOST_INPUTS, _MOST_COMPARED = 10, 4, 24, 12, 8
 # A condition is a range, or two, as narrow as this share of all values, in which a signal is for no more than
 # this share of the time, and in which some signal would be each time by chance with no more than this
 # probability.
@@ -26,7 +26,7 @@ _NARROW, _SELDOM, _CHANCE = 0.1, 0.6, 0.1
 _CLEARLY = 0.5
 # Times may differ by one step of the output in so many, which is how accurate they are.
 _STEPS = 11
-# A signal with so many different changes counts: all that lead up are told together, and all that lead down.
+# A signal with so many different values counts: all that lead up are told together, and all that lead down.
 _COUNTS = 7
 # A signal that changes more often in a sample chatters, and nothing is told of it.
 _CHATTERS = 200
@@ -41,12 +41,15 @@ _HEAD = (
     "inputs at that time or until then, were as follows; what samples with the same beginning share counts "
     "once:"
 )
-# What is told of a signal: its value, that of an input that may just have changed, how long it had its value.
-_VALUE, _UNTIL, _UNCHANGED = (
+# What is told of a signal: that it is an input that was just switched, its value, that of an input that may
+# just have been switched, for how long it had its value.
+_SWITCHED, _VALUE, _UNTIL, _UNCHANGED = (
+    "{name} just changed",
     "{name} {values}",
     "{name} {values} until then",
     "{name} unchanged for {values} s",
 )
+_ORDER = (_SWITCHED, _VALUE, _UNCHANGED)
 
 
 @dataclass
@@ -54,7 +57,10 @@ class Regularities:
     """Collects what was so when discrete signals changed, and others jumped."""
 
     view: View
-    _known: list[Array] = field(default_factory=list)  # values of a sample, shape (signals, times)
+    # What is looked at of a sample: at all times, and for times since, when anything was switched.
+    _known: list[Array] = field(default_factory=list)
+    _switched: list[Array] = field(default_factory=list)
+    _levels: defaultdict[str, set[float]] = field(default_factory=lambda: defaultdict(set))
     # By signal and its change, in words and whether it leads up, the values of all signals, then the time, as
     # bytes: samples with the same beginning have the same changes there, which are one.
     _seen: defaultdict[str, defaultdict[tuple[str, bool], dict[bytes, None]]] = field(
@@ -74,11 +80,17 @@ class Regularities:
         unchanged = times - np.roll(times[since], 1, axis=1)
         unchanged[:, 0] = 0.0
         before, first = np.roll(values, 1, axis=1), len(self._names) - len(self._inputs)
-        known = np.vstack((values, values[first:], unchanged))
+        age = times - times[since[first:]]
+        known = np.vstack((values, values[first:], age))
         self._known.append(known[:, :: max(1, len(inside) // _TIMES)])
-        then = np.vstack((before[:first], values[first:], before[first:], unchanged, times))
-        rows = then.T + 0.0  # there are two zeros, with other bytes
         discrete = self.view.discrete(inside)
+        is_switched = [
+            n in discrete or (k >= first and changed[k].mean() < _SELDOM) for k, n in enumerate(self._names)
+        ]
+        at = np.flatnonzero(changed[is_switched].any(axis=0))
+        self._switched.append(unchanged[:, at[:: max(1, len(at) // _TIMES)]])
+        then = np.vstack((before[:first], values[first:], before[first:], age, unchanged, times))
+        rows = then.T + 0.0  # there are two zeros, with other bytes
         for place, name in enumerate(self._recorded):
             column = inside[name]
             if name in discrete:
@@ -95,6 +107,7 @@ class Regularities:
             for change, at in changes.items():
                 pairs = list(zip(column[at - 1].tolist(), column[at].tolist(), strict=True))
                 ends = {v: value_text(self.view, name, v) for v in {*chain(*pairs)} if not change}
+                self._levels[name].update(ends)
                 for (old, new), row in zip(pairs, rows[at], strict=True):
                     told = change or f"{ends[old]} -> {ends[new]}"
                     self._seen[name][told, new > old][row.tobytes()] = None
@@ -103,7 +116,11 @@ class Regularities:
     def text(self) -> str:
         """What was so each time, in a line for each change, those of the requirement's signals first."""
         names = (n for n in self._recorded if n in self._seen and n not in self._chattering)
-        known = np.concatenate(self._known, axis=1) if self._known else np.empty(0)
+        known = (
+            [*np.concatenate(self._known, axis=1), *np.concatenate(self._switched, axis=1)]
+            if self._known
+            else []
+        )
         lines = [line for name in names for line in self._of(name, known)]
         lines.sort(key=lambda line: f" {_JUMPS} " in line or f" {_STARTS} " in line)
         return "\n".join((_HEAD, *lines[:_MOST_TOLD])) if lines else ""
@@ -126,11 +143,12 @@ class Regularities:
     @cached_property
     def _told(self) -> tuple[tuple[str, str], ...]:
         """What is looked at at each change: of which signal, and how it is told."""
-        forms = ((self._names, _VALUE), (self._inputs, _UNTIL), (self._names, _UNCHANGED))
+        inputs, names = self._inputs, self._names
+        forms = ((names, _VALUE), (inputs, _UNTIL), (inputs, _SWITCHED), (names, _UNCHANGED))
         return tuple((name, form) for names, form in forms for name in names)
 
-    def _of(self, name: str, known: Array) -> Iterator[str]:
-        counts = len(self._seen[name]) >= _COUNTS
+    def _of(self, name: str, known: Sequence[Array]) -> Iterator[str]:
+        counts = len(self._levels[name]) >= _COUNTS
         # It may have looked discrete in other samples.
         is_real = any(change in (_JUMPS, _STARTS) for change, _ in self._seen[name])
         changes: defaultdict[str, dict[bytes, None]] = defaultdict(dict)
@@ -144,29 +162,43 @@ class Regularities:
             if so := self._common(seen.T, known, without="" if is_real else name):
                 yield f"- {name} {change}, {len(seen)} times: {', '.join(so[:_MOST_CONDITIONS])}"
 
-    def _common(self, seen: Array, known: Array, *, without: str) -> list[str]:
+    def _common(self, seen: Array, known: Sequence[Array], *, without: str) -> list[str]:
         """What was in a narrow range each time, and seldom is, the most telling first, times at the end.
 
-        ``seen`` has its values then, ``known`` those at all times, shape (2 signals + inputs, times) each.
+        ``seen`` has what is looked at then, ``known`` what it is otherwise, one row for each.
         """
-        found, step = dict[tuple[bool, str], tuple[float, float, str]](), self.view.experiment.output_interval
+        found = dict[tuple[int, str], tuple[float, float, str]]()
         for (name, form), values, usual in zip(self._told, seen, known, strict=True):
-            is_time = form == _UNCHANGED
-            span = float(max(values.max(), _STEPS * step) if is_time else np.ptp(usual))
-            ranges = [] if name == without and not is_time else _ranges(values, span)
+            kind = _ORDER.index(_VALUE if form == _UNTIL else form)
+            ranges = [] if name == without and kind == 1 else self._ranges(form, values, usual)
             share = float(sum(((usual >= low) & (usual <= high)).mean() for low, high in ranges))
             # The first time in each range says where it is.
             by_chance = len(self._told) * share ** (len(values) - len(ranges))
-            if not ranges or share > _SELDOM or by_chance > _CHANCE or (is_time and values.min() < 2 * step):
+            if not ranges or share > _SELDOM or by_chance > _CHANCE:
                 continue
             width = sum(high - low for low, high in ranges)
-            if form == _UNTIL and width >= _CLEARLY * found.get((is_time, name), (0.0, inf))[1]:
+            if form == _UNTIL and width >= _CLEARLY * found.get((kind, name), (0.0, inf))[1]:
                 continue
-            digits, told = column_decimals(usual), plain if is_time else partial(value_text, self.view, name)
-            ends = (dict.fromkeys(told(v, digits) for v in one) for one in ranges)
+            told = plain if form == _UNCHANGED else partial(value_text, self.view, name)
+            ends = (dict.fromkeys(told(v, column_decimals(usual)) for v in one) for one in ranges)
             text = form.format(name=name, values=" or ".join(map(" to ".join, ends)))
-            found[is_time, name] = share, width, text
-        return [text for *_, text in sorted((is_time, *told) for (is_time, _), told in found.items())]
+            found[kind, name] = share, width, text
+        if own := found.pop(
+            (2, without), None
+        ):  # it is a time limit, and what others had since then is chance
+            is_timer = not any(kind == 0 for kind, _ in found)
+            found = {key: each for key, each in found.items() if key[0] < 2}
+            found |= {(2, without): own} if is_timer else {}
+        return [text for *_, text in sorted((kind, *each) for (kind, _), each in found.items())]
+
+    def _ranges(self, form: str, values: Array, usual: Array) -> list[tuple[float, float]]:
+        """The narrow ranges in which what is looked at was each time, if there are."""
+        step = self.view.experiment.output_interval
+        if form == _SWITCHED:
+            return [(0.0, 1.5 * step)] if values.max() <= 1.5 * step else []
+        if form != _UNCHANGED:
+            return _ranges(values, float(np.ptp(usual)))
+        return _ranges(values, max(float(values.max()), _STEPS * step)) if values.min() >= 2 * step else []
 
 
 def _ranges(values: Array, span: float) -> list[tuple[float, float]]:

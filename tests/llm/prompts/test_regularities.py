@@ -40,7 +40,7 @@ def test_thresholds_and_conditions_are_told_of_changes_that_were_seen_several_ti
         f"- n {way}, 12 times: x 1.991, n unchanged for 11.5 s" for way in ("0 -> 1", "1 -> 0")
     ]
     assert on.startswith("- mode 0 -> 1, ") and off.startswith("- mode 1 -> 0, ")
-    assert "u 1" in on and "u -1" in off, "an input has its new value"
+    assert "u just changed, u 1" in on and "u just changed, u -1" in off, "an input has its new value"
 
 
 def test_two_thresholds_are_told_as_two() -> None:
@@ -65,13 +65,10 @@ def test_how_long_an_input_had_its_value_and_which_where_it_changes_at_the_same_
     view = View.of(lag_problem("G (x <= 0.9)"))
     seen = Regularities(replace(view, info=ModelInfo("m", variables=(Variable("x", kind="integer"),))))
     times = np.linspace(0.0, 10.0, 101)
-    for start in (2.0, 3.0, 5.5, 6.5):  # the input is 0.25 for one second
-        held = (times > start - 1.05) & (times < start - 0.05)
-        seen.add(
-            Trajectory(
-                times, {"x": np.where(times > start - 0.05, 1.0, 0.0), "u": np.where(held, 0.25, start / 9)}
-            )
-        )
+    for start in (2.0, 3.0, 5.5, 6.5):  # the input is 0.25 for one second, and then changes more often
+        held, acts = (times > start - 1.05) & (times < start - 0.05), times > start - 0.05
+        u = np.where(held, 0.25, np.where(acts, np.floor(times * start) / 40, start / 9))
+        seen.add(Trajectory(times, {"x": acts.astype(np.float64), "u": u}))
     assert seen.text.endswith("- x 0 -> 1, 4 times: u 0.25 until then, u unchanged for 1 s")
 
 
