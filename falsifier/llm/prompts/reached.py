@@ -53,13 +53,15 @@ class SampleProgress:
             if view.is_discrete(name, column):
                 begun = np.flatnonzero(np.diff(column, prepend=np.nan)).tolist()
                 stages |= {(name, None, value) for value in column[begun].tolist()}
-                if name in view.formula_outputs or len(begun) <= _MOST_OF_MODE:
-                    again.update(begun[1 : _MOST_SWITCHES + 2])
+                first: dict[Stage, int] = {}  # where each change came first
                 for before, k in pairwise(begun):
-                    change = (name, float(column[before]), float(column[k]))
-                    if change not in stages:
-                        stages.add(change)
-                        changes[k] = (*changes.get(k, ()), change)
+                    first.setdefault((name, float(column[before]), float(column[k])), k)
+                stages |= first.keys()
+                for change, k in first.items():
+                    changes[k] = (*changes.get(k, ()), change)
+                is_mode = name in view.formula_outputs and len(first) <= _MOST_OF_MODE
+                if is_mode or len(begun) <= _MOST_OF_MODE:
+                    again.update(begun[1 : _MOST_SWITCHES + 2])
             elif np.isfinite(column).all():
                 ranges[name] = (float(column.min()), float(column.max()))
         return cls(frozenset(stages), ranges, dict(sorted(changes.items())), frozenset(again))

@@ -275,7 +275,7 @@ def test_of_a_counter_that_rises_far_its_first_values_and_the_last_are_told() ->
     view = replace(view, info=ModelInfo("m", variables=(Variable("x", kind="integer"),)))
     times = np.linspace(0.0, 10.0, 101)
     reached = Reached(view)
-    rises = "; ".join(f"x {n} -> {n + 1} at {n + 1} s" for n in (*range(7), 8))
+    rises = "; ".join(f"x {n} -> {n + 1} at {n + 1} s" for n in (2, 3, 8))
     for top, values, changes in (
         (0, (), ""),
         (2, ("x 1", "x 2"), "x 0 -> 1 at 1 s; x 1 -> 2 at 2 s"),
