@@ -79,8 +79,8 @@ def tokens(messages: Sequence[Message]) -> int:
 def told_courses(view: View, evaluation: Evaluation) -> Iterator[Told]:
     """The courses that a prompt tells of one sample, in full and in short, against its trajectory."""
     trajectory = evaluation.trajectory
-    assert trajectory is not None
-    inside = view.inside(trajectory)
+    assert trajectory is not None and evaluation.verdict is not None
+    inside, critical = view.inside(trajectory), evaluation.verdict.critical_time
     columns = {n: inside[n] for n in view.experiment.outputs} | compared_columns(view, inside)
     seen = observed(view, evaluation)
     for line in (*seen.full, *seen.short):
@@ -92,7 +92,7 @@ def told_courses(view: View, evaluation: Evaluation) -> Iterator[Told]:
                 stated = told_accuracy(view, name, column)
                 yield _compared(name, line[len(name) + 2 :], inside.times, column, stated, clock)
             if line.startswith(f"{name} around t = ") and "irregular, " not in line:
-                part = close_up_times(view, inside.times, column, evaluation)
+                part = close_up_times(view, inside.times, column, critical, critical)
                 times, column = inside.times[part], column[part]
                 stated = CLOSE_TOLERANCE * float(np.ptp(column))
                 yield _compared(name, line.partition(" s: ")[2], times, column, stated, 6)

@@ -91,7 +91,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     inside = view.inside(trajectory)
     discrete = tuple(_discrete(view, inside))
     deciding = deciding_columns(view, verdict, inside)
-    over_all = (*continuous(view, evaluation, inside), *close_up(view, evaluation, inside, deciding))
+    over_all = (*continuous(view, evaluation, inside), *close_up(view, verdict, inside, deciding, failure))
     few_courses = (f"{n}: {drawn(view, n, inside, c, (), FEWER_BREAKPOINTS)}" for n, c in deciding.items())
     return Observed(
         (*reasons, *there, *parts, *discrete, *predicates, *over_all),

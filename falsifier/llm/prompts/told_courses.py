@@ -30,6 +30,8 @@ _SLOWEST_OSCILLATION = 1 / 20
 _CLOSE_SHARE = 1 / 12
 _CLOSE_PERIODS = 2.5
 CLOSE_TOLERANCE = 0.01
+# A longest failure that takes more than this share of the told time is not told more exactly.
+_LONGEST_CLOSE = 0.5
 # What changes by no more than this share of the robustness in that interval is not told there.
 _AT_REST = 0.01
 # Breakpoints of signals that the formula does not compare, and of those of samples that are told in short.
@@ -113,13 +115,25 @@ def drawn(view: View, name: str, inside: Trajectory, column: Array, steps: Seque
 
 
 def close_up(
-    view: View, evaluation: Evaluation, inside: Trajectory, deciding: Mapping[str, Array]
+    view: View,
+    verdict: Verdict,
+    inside: Trajectory,
+    deciding: Mapping[str, Array],
+    failure: tuple[float, float] | None,
 ) -> Iterator[str]:
-    """What the deciding predicate compares, more exactly around the critical time."""
-    verdict = evaluation.verdict
-    assert verdict is not None
+    """What the deciding predicate compares, more exactly around the critical time.
+
+    If there is a longest failure of what must recur, given by its first and last time in s, around that.
+    """
+    critical, clock = verdict.critical_time, fine_clock(view)
+    first, last = failure or (critical, critical)
+    where = f"t = {plain(critical, clock)} s"
+    if failure:
+        where = f"the longest failure, from {plain(first, clock)} to {plain(last, clock)} s"
+    if last - first > _LONGEST_CLOSE * float(inside.times[-1]):
+        return
     for name, column in deciding.items():
-        near = close_up_times(view, inside.times, column, evaluation)
+        near = close_up_times(view, inside.times, column, first, last)
         part = column[near]
         if np.ptp(part) <= _AT_REST * abs(verdict.robustness):
             continue
@@ -128,27 +142,26 @@ def close_up(
         told = courses.course(
             inside.times[near],
             part,
-            clock=fine_clock(view),
+            clock=clock,
             # Less than is claimed if the margin would not be visible.
             tolerance=min(claimed, max(visible, _FINEST * float(np.ptp(part)))),
             claimed=claimed,
             slower_than=0.0,
-            kept=(verdict.critical_time,),
+            kept=(first, last),
             coarsest=_COARSEST,
         )
-        yield f"{name} around t = {plain(verdict.critical_time, fine_clock(view))} s: {told}"
+        yield f"{name} around {where}: {told}"
 
 
-def close_up_times(view: View, times: Array, column: Array, evaluation: Evaluation) -> NDArray[np.bool_]:
-    """Which times are told more exactly: a share of them around the critical time, or a few periods."""
-    assert evaluation.verdict is not None
-    critical = evaluation.verdict.critical_time
+def close_up_times(view: View, times: Array, column: Array, first: float, last: float) -> NDArray[np.bool_]:
+    """Which times are told more exactly: from first to last, and a share of all, or a few periods, beside."""
     reach = _CLOSE_SHARE / 2 * float(times[-1])
     swings = courses.oscillations(times, column, slower_than=_SLOWEST_OSCILLATION * float(times[-1]))
-    around = [s for s in swings if s.start <= critical <= s.end]
+    around = [s for s in swings if s.start <= first <= s.end]
     if around:
         reach = _CLOSE_PERIODS / 2 * around[0].periods[0]
-    return np.asarray(np.abs(times - critical) <= max(reach, 4 * view.experiment.output_interval))
+    reach = max(reach, 4 * view.experiment.output_interval)
+    return np.asarray((first - times <= reach) & (times - last <= reach))
 
 
 def _input_steps(view: View, evaluation: Evaluation) -> tuple[float, ...]:

@@ -124,6 +124,12 @@ def test_both_sides_of_the_connectives_on_the_way_are_told() -> None:
     assert "robustness -1 V" in line(lines, "alternatives at t = 0 s: ")
 
 
+def test_around_the_longest_failure_of_what_must_recur_courses_are_more_exact() -> None:
+    failing = np.where((TIMES >= 3) & (TIMES <= 5), 0.2 * np.sin(TIMES) + TIMES / 10, 2 + TIMES / 10)
+    _, around = courses(*seen("G[0,7] F[0,3] (x >= 1)", failing))
+    assert around.startswith("x around the longest failure, from 3 to 5 s: 2.6:2.26 ")
+
+
 def test_courses_are_breakpoints_and_more_exact_ones_where_it_was_decided() -> None:
     view, evaluation = seen("G[0,10] (x <= 2)", np.sin(TIMES / 2))
     over_time, around = courses(view, evaluation)
