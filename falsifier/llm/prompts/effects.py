@@ -78,8 +78,8 @@ class Effects:
         longest = sorted(self._alike.values(), key=lambda a: a.begin - a.end)[:_MOST_TOLD]
         told = (
             f"samples {_few([*map(str, a.numbers)])} until {self._ends[a.end]} s, though "
-            f"{_few([name for name in self.view.space.names if name in a.differing])} differed at "
-            f"{self._ends[a.begin]} s or before"
+            f"{_few([name for name in self.view.space.names if name in a.differing])} differed from "
+            f"about {self._ends[a.begin]} s on"
             for a in longest
         )
         return (

@@ -129,9 +129,15 @@ class Reached:
 
         def told(name: str, *, jumps: bool) -> str:
             column = columns[name]
-            values = column[k - 1 : k + 1] if jumps else column[k : k + 1]
-            ends = (value_text(self._view, name, v, column_decimals(column)) for v in values.tolist())
-            return f"{name} {' -> '.join(ends)}"
+            new = value_text(self._view, name, float(column[k]), column_decimals(column))
+            if not jumps:
+                return f"{name} {new}"
+            old = value_text(self._view, name, float(column[k - 1]), column_decimals(column))
+            since = int(np.flatnonzero(np.diff(column[:k], prepend=np.nan))[-1])
+            stay = (
+                f" for {number(trajectory.times[k] - trajectory.times[since], 4)} s" if since < k - 1 else ""
+            )
+            return f"{name} {old}{stay} -> {new}"
 
         together = (
             self._stage((n, float(columns[n][k - 1]), float(columns[n][k])))

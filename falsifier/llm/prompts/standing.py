@@ -89,7 +89,8 @@ _AS_IN_NOTE = (
 _FREE_NOTE = (
     'If "times" is empty, the values are evenly spaced from 0 to the stop time, however many there are, as '
     "pieces of equal length if interpolation is constant; one value alone is a constant. Otherwise "
-    '"times" gives the time in s of each value, increasing from 0; the last value is held to the stop time.'
+    '"times" gives the time in s of each value, increasing, the first one 0 and none after the stop time, to '
+    "which the last value is held."
 )
 _FIXED_NOTE = ' The control points of {} are fixed: leave "times" empty, and give as many values as shown.'
 _LESSONS_NOTE = (

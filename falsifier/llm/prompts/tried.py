@@ -1,6 +1,6 @@
 """Which values of what is chosen the samples have tried; told where the robustness gives no direction."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TypeVar
@@ -20,8 +20,10 @@ _WIDE = 0.3
 _VALUES, _MOST_LISTED, _DIGITS = 100, 6, 2
 # More different ranges, or stays, most of which do not matter, are not told.
 _MOST_GAPS = 4
-# The longest stay at a value is told if it is shorter than this share of the simulation.
-_LONG = 0.3
+# The longest stay at a value is told if it is shorter than this share of the simulation, or this one if there
+# are few values; of parts of the range of a real input, of which there are so many, if it is that brief.
+_LONG, _LONG_OF_FEW, _FEW, _BRIEF, _PARTS = 0.3, 0.7, 3, 0.02, 10
+_SOME_PARTS = range(1, 6)  # more of them are not told
 
 T = TypeVar("T", bound=Range)
 
@@ -77,17 +79,34 @@ class Tried:
             return ""
         stays = {value: stay for (name, value), stay in self._longest.items() if name == r.name}
         if r.kind == "real":
-            longest = max((stay for value, stay in stays.items() if r.low < value < r.high), default=0.0)
-            at = {longest: ["a value between its limits"]}
-        else:
-            at = {
-                stay: [str(int(v)) for v, s in sorted(stays.items()) if s == stay] for stay in stays.values()
-            }
+            return self._short_between(r, {v: stay for v, stay in stays.items() if r.low < v < r.high})
+        at = {stay: [str(int(v)) for v, s in sorted(stays.items()) if s == stay] for stay in stays.values()}
         told = (
             f"at {', '.join(values[:_MOST_LISTED])} for more than {number(stay, _DIGITS + 1)} s"
             for stay, values in sorted(at.items())
-            if 0 < stay < _LONG * self.view.space.stop_time
+            if 0 < stay < (_LONG_OF_FEW if len(r.numbers) <= _FEW else _LONG) * self.view.space.stop_time
         )
+        return ", ".join(told)
+
+    def _short_between(self, r: InputRange, stays: Mapping[float, float]) -> str:
+        """The same of values between the limits: of all of them, or of the parts with hardly any stay."""
+        longest, stop_time = max(stays.values(), default=0.0), self.view.space.stop_time
+        if not longest:
+            return ""
+        if longest < _LONG * stop_time:
+            return f"at a value between its limits for more than {number(longest, _DIGITS + 1)} s"
+        in_part = np.zeros(_PARTS)
+        for value, stay in stays.items():
+            part = min(int(r.share_of(value) * _PARTS), _PARTS - 1)
+            in_part[part] = max(in_part[part], stay)
+        short, told = np.flatnonzero(in_part < _BRIEF * stop_time), list[str]()
+        for run in (
+            np.split(short, np.flatnonzero(np.diff(short) > 1) + 1) if len(short) in _SOME_PARTS else ()
+        ):
+            begin, end = bounds(r.at(int(run[0]) / _PARTS), r.at((int(run[-1]) + 1) / _PARTS), _DIGITS)
+            most = float(in_part[run].max())
+            stay = f" for more than {number(most, _DIGITS + 1)} s" if most else ""
+            told.append(f"{'' if most else 'constant '}between {begin} and {end}{stay}")
         return ", ".join(told)
 
 
