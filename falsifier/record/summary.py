@@ -75,7 +75,7 @@ class Summary:
         """Update the numbers with one record."""
         if self.counterexample is not None:
             return
-        self.status = "running"
+        self.status, self.reason, self.findings = "running", "", ()  # not those before it was resumed
         self.spent = replace(self.spent, seconds=records.elapsed_at(record))
         match record:
             case records.EvaluatedRecord():
