@@ -89,6 +89,7 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
         return live
     exchanges, unrepeated = played_back(records)
     evaluated = {r.index: r for r in records if isinstance(r, EvaluatedRecord)}
+    confirmed = {(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)}
     return ReplayedSteps(
         executor=live.executor,
         internals=live.internals,
@@ -98,7 +99,8 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
         asked={r.first: r for r in records if isinstance(r, AskedRecord)},
         directory=directory,
         evaluated=evaluated,
-        confirmed={(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
+        spent={key: record.spent for key, record in confirmed.items()},
+        confirmed=confirmed,
         exchanges=iter(exchanges),
     )
 

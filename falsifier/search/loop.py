@@ -319,7 +319,7 @@ class _Loop:
         """Check a violation of one requirement; a fragile or refuted one does not end the search for it."""
         confirmation = self.steps.confirm(state.problem, evaluation, self.count - 1)
         with undisturbed():
-            spent = self.clock()
+            spent = self.steps.spent.get((self.count - 1, state.problem.name)) or self.clock()
             if confirmation.outcome == "confirmed":
                 state.counterexample, state.spent = confirmation, spent
             else:
