@@ -174,10 +174,12 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
             time.sleep(_WATCH_PERIOD)
         progress = follower.look()  # after the lock was released: by then everything has been written
         show(progress)
-    for run in () if is_campaign(directory) else progress.runs:
+    is_retried = is_campaign(directory)  # what failed in it
+    for run in () if is_retried else progress.runs:
         say(str(replace(run, status="interrupted") if run.status == "running" else run))
     say(overall_line(progress, stopped=True))
-    if progress.finished < len(progress.runs):
+    ended = (r.status == "failed" and r.spent.has_mostly_failed and not is_retried for r in progress.runs)
+    if progress.finished + sum(ended) < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shell_word(directory)}")
 
 

@@ -23,7 +23,7 @@ from falsifier.counterexamples.export.tables import input_table, write_csv
 from falsifier.counterexamples.regression import Database
 from falsifier.counterexamples.robustness_map import BUDGET as MAP_BUDGET, robustness_map
 from falsifier.counterexamples.shrink import BUDGET as SHRINK_BUDGET, shrink
-from falsifier.counterexamples.store import EXPLANATION, beside, replay as replay_stored, save
+from falsifier.counterexamples.store import EXPLANATION, SHRUNK, beside, replay as replay_stored, save
 from falsifier.evaluation.confirm import confirm, other_interface
 from falsifier.evaluation.evaluate import Evaluation
 from falsifier.problem.joining import rights_notes
@@ -200,9 +200,10 @@ def _shrink(
         confirmation = confirm(problem, found) if found.violated else None
         if confirmation is not None and confirmation.outcome == "refuted" and case.is_miss:
             confirmation = None  # else case.content says so
-        with suppress(OSError):
-            beside(case.file, EXPLANATION).unlink(missing_ok=True)  # it was about another input
         table, data = input_table(problem, found.candidate), file.with_suffix(".json")
+        if data.resolve() == beside(case.file, SHRUNK).resolve():  # which is explained instead from now on
+            with suppress(OSError):
+                beside(case.file, EXPLANATION).unlink(missing_ok=True)
         paths = files.saved(file, lambda name: write_csv(table, name, problem.model)) if case.is_miss else []
         if confirmation is not None:
             paths += files.saved(data, partial(save, case.content(confirmation)))

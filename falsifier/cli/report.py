@@ -117,9 +117,14 @@ def _evaluations_csv(directories: Iterable[Path]) -> str:
 
     What a run did not search has no value in its rows.
     """
-    runs = [(run, run.columns()) for directory in directories for run in load(directory)]
+    own = ("directory", "requirement", "method", "seed")
+    runs = [
+        (run, {f"{n} (varied)" if n in own else n: column for n, column in run.columns().items()})
+        for directory in directories
+        for run in load(directory)
+    ]
     names = dict.fromkeys(name for _, columns in runs for name in columns)
-    table: Columns = {name: [] for name in ("directory", "requirement", "method", "seed", *names)}
+    table: Columns = {name: [] for name in (*own, *names)}
     for run, columns in runs:
         count = len(columns["simulation"])
         about = {"requirement": run.requirement, "method": run.method.label, "seed": run.seed}

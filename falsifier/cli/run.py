@@ -1,6 +1,7 @@
 """``falsifier run`` and ``falsifier resume``."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -11,6 +12,7 @@ from falsifier.cli import options
 from falsifier.cli.command import Command, command, refuse
 from falsifier.cli.llm_options import check_context, context_option, llm_options, llm_settings, read_budget
 from falsifier.cli.output import INTERRUPTED, as_shown, conclude
+from falsifier.core.arguments import utf_8
 from falsifier.errors import JournalError, SpecError
 from falsifier.views.terminal import warn
 
@@ -177,13 +179,13 @@ def resume(
 
 
 def _known(place: Path, problem: "Problem") -> "Candidate":
-    """Read known inputs, and say on stderr what was changed to fit them to the search space."""
-    from falsifier.counterexamples.case import known_inputs
+    """Read known inputs as they are, and say on stderr what of a file is not used."""
+    from falsifier.counterexamples.case import read_known
 
-    fitted = known_inputs(place, problem)
-    for note in fitted.notes:
+    found, notes = read_known(place, problem)
+    for note in notes:
         warn(f"{place}: {note}")
-    return fitted.candidate
+    return replace(found, rationale=f"from {utf_8(str(place))}")
 
 
 def _finish(results: "list[Result]", *, as_json: bool) -> NoReturn:

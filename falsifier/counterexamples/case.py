@@ -4,14 +4,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from falsifier.core.arguments import utf_8
 from falsifier.core.candidate import Candidate
-from falsifier.core.fitting import Fitted, fit
 from falsifier.core.literals import shell_word
 from falsifier.core.words import counted
 from falsifier.counterexamples import store
 from falsifier.counterexamples.store import StoredCounterexample
-from falsifier.engines.protocol import KNOWN
 from falsifier.errors import CandidateError, SimulationError, SpecError, written
 from falsifier.evaluation.confirm import Confirmation
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -209,21 +206,6 @@ def _chosen(place: Path, described: Manifest, requirement: str | None) -> str:
     found = [name for name in described.names if (place / store.file_of(name, shared=True)).exists()]
     is_clear = requirement is None and len(found) == 1
     return found[0] if is_clear else described.of(requirement).requirement.name
-
-
-def known_inputs(place: Path, problem: Problem) -> Fitted:
-    """Read known inputs, and fit them to a problem's search space.
-
-    Raises:
-        SpecError: if there are none; see ``read_known``.
-        CandidateError: naming the place and what does not fit the search space.
-    """
-    found, notes = read_known(place, problem)
-    try:
-        fitted = fit(problem.space, replace(found, origin=KNOWN, rationale=f"from {utf_8(str(place))}"))
-    except CandidateError as error:
-        raise CandidateError(f"{place}: {error}") from None
-    return replace(fitted, notes=(*notes, *fitted.notes))
 
 
 def read_known(place: Path, problem: Problem) -> tuple[Candidate, list[str]]:

@@ -96,6 +96,12 @@ def evaluate(problem: Problem, candidate: Candidate) -> Evaluation:
 
 def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
     """Evaluate a candidate that need not fit: a pure function, in whichever process it runs."""
+    found = evaluate_for_all(problem, candidate)
+    return judge(problem, found) if found.verdict is None else found
+
+
+def evaluate_for_all(problem: Problem, candidate: Candidate) -> Evaluation:
+    """Do the same; what cannot be judged keeps its trajectory: other requirements may be judged by it."""
     started = perf_counter()
     try:
         outputs = _outputs(problem, candidate)
@@ -104,7 +110,9 @@ def evaluate_any(problem: Problem, candidate: Candidate) -> Evaluation:
         return Evaluation(candidate, error.status, None, str(error), None, seconds, error.log)
     seconds = perf_counter() - started
     trajectory = _with_inputs(problem, candidate, outputs)
-    return judge(problem, Evaluation(candidate, trajectory=trajectory, seconds=seconds, log=outputs.log))
+    simulated = Evaluation(candidate, trajectory=trajectory, seconds=seconds, log=outputs.log)
+    judged = judge(problem, simulated)
+    return simulated if judged.verdict is None else judged
 
 
 def _outputs(problem: Problem, candidate: Candidate) -> Trajectory:
@@ -279,7 +287,8 @@ def judge(problem: Problem, evaluation: Evaluation) -> Evaluation:
     if evaluation.trajectory is None:
         return evaluation
     try:
-        return replace(evaluation, verdict=monitor_for(problem).evaluate(evaluation.trajectory))
+        verdict = monitor_for(problem).evaluate(evaluation.trajectory)
+        return replace(evaluation, status="ok", reason="", verdict=verdict)
     except MonitorError as error:
         return replace(evaluation, status="failed", verdict=None, reason=str(error), trajectory=None)
 

@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 from falsifier.core.candidate import Candidate
 from falsifier.core.model import Model
 from falsifier.errors import MachineError, Reader, SpecError, reader, setting, speak_to
-from falsifier.evaluation.evaluate import Evaluation, evaluate_any
+from falsifier.evaluation.evaluate import Evaluation, evaluate_for_all
 from falsifier.fmu import stop_simulations
 from falsifier.problem.problem import Problem
 
@@ -136,13 +136,14 @@ def start(
 ) -> list[Callable[[], Evaluation]]:
     """Start to simulate candidates; return functions that wait for their evaluations, in order.
 
+    What the problem's requirement cannot judge has no verdict, and its trajectory.
     Without an executor, a function simulates when it is called. A pool of processes is lost with the first
     that dies, so its simulations are repeated one at a time, each in a process of its own; the one that ends
     that process too has the status ``crashed``.
     """
     if executor is None:
-        return [partial(evaluate_any, problem, candidate) for candidate in candidates]
-    return [partial(_wait, problem, c, executor.submit(evaluate_any, problem, c)) for c in candidates]
+        return [partial(evaluate_for_all, problem, candidate) for candidate in candidates]
+    return [partial(_wait, problem, c, executor.submit(evaluate_for_all, problem, c)) for c in candidates]
 
 
 def _wait(problem: Problem, candidate: Candidate, future: "Future[Evaluation]") -> Evaluation:
@@ -150,7 +151,7 @@ def _wait(problem: Problem, candidate: Candidate, future: "Future[Evaluation]") 
         return future.result()
     with _processes(1) as alone:
         try:
-            return alone.submit(evaluate_any, problem, candidate).result()
+            return alone.submit(evaluate_for_all, problem, candidate).result()
         except BrokenExecutor as error:
             return Evaluation(candidate, "crashed", reason=death(error))
 

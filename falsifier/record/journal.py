@@ -154,8 +154,10 @@ class Journal:
         evaluation, file = event.evaluation, None
         is_kept = event.index < _KEPT_TRAJECTORIES or evaluation.seconds > _SLOW
         every = self._keep == "history" and is_kept and self._kept_bytes < _KEPT_BYTES
-        if evaluation.trajectory is not None and (event.improved or every):
-            file = files.save_trajectory(self.directory, event.index, evaluation.trajectory)
+        # Of any requirement that could be judged.
+        trajectory = next((e.trajectory for e in event.judged.values() if e.trajectory is not None), None)
+        if trajectory is not None and (event.improved or every):
+            file = files.save_trajectory(self.directory, event.index, trajectory)
             self._kept_bytes += (self.directory / file).stat().st_size
         self.write(
             EvaluatedRecord(

@@ -79,7 +79,12 @@ class EvaluatedRecord(_Record):
     def evaluation(self, candidate: Candidate, requirement: str) -> Evaluation:
         """Return what was recorded, without the trajectory, given the candidate and who judges."""
         verdict, log = self.verdicts.get(requirement), tuple(self.log)
-        return Evaluation(candidate, self.status, verdict, self.reason, seconds=self.seconds, log=log)
+        status, reason = self.status, self.reason  # for the requirement whose engine suggested the candidate
+        if verdict is not None:
+            status, reason = "ok", ""
+        elif status == "ok":
+            status, reason = "failed", f"{requirement} could not be judged"
+        return Evaluation(candidate, status, verdict, reason, seconds=self.seconds, log=log)
 
 
 class ExchangeRecord(_Record):

@@ -69,11 +69,21 @@ class ReplayedSteps(Steps):
         recorded = record.evaluation(candidate, problem.name)
         # Read only now: those of all evaluations together would fill the memory.
         trajectory = recorded_trajectory(self.directory, record.trajectory)
-        if recorded.verdict is None or trajectory is not None:
+        if not any(record.verdicts.values()) or trajectory is not None:
             return lambda: replace(recorded, trajectory=trajectory)
-        # The trajectory was not kept, but engines need it.
         simulate = start(problem, [candidate])[0]
-        return lambda: replace(recorded, trajectory=simulate().trajectory)
+
+        def repeat() -> Evaluation:
+            """Simulate again what was judged but not kept: engines, and other requirements, need it."""
+            again = simulate()
+            if again.trajectory is None:
+                raise JournalError(
+                    f"cannot resume: simulation {index + 1}, whose trajectory was not kept, now "
+                    f"{again.outcome}; resume again, or start a new run"
+                )
+            return replace(recorded, trajectory=again.trajectory)
+
+        return repeat
 
     def confirm(self, problem: Problem, evaluation: Evaluation, index: int) -> Confirmation:
         """Return the recorded confirmation of a violation; without one, confirm it."""
@@ -89,6 +99,7 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
         return live
     exchanges, unrepeated = played_back(records)
     evaluated = {r.index: r for r in records if isinstance(r, EvaluatedRecord)}
+    confirmed = {(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)}
     return ReplayedSteps(
         executor=live.executor,
         internals=live.internals,
@@ -98,7 +109,8 @@ def replayed(directory: Path, records: Sequence[Record], live: Steps) -> Steps:
         asked={r.first: r for r in records if isinstance(r, AskedRecord)},
         directory=directory,
         evaluated=evaluated,
-        confirmed={(r.index, r.requirement): r for r in records if isinstance(r, ConfirmedRecord)},
+        spent={key: record.spent for key, record in confirmed.items()},
+        confirmed=confirmed,
         exchanges=iter(exchanges),
     )
 

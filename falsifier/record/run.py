@@ -17,7 +17,7 @@ from falsifier.core.space import SearchSpace
 from falsifier.core.words import counted
 from falsifier.engines import ENGINES
 from falsifier.engines.protocol import KNOWN, Engine
-from falsifier.errors import JournalError, SpecError
+from falsifier.errors import CandidateError, JournalError, SpecError, written
 from falsifier.evaluation.evaluate import readable_internals
 from falsifier.evaluation.workers import local_executor
 from falsifier.llm.messages import Chat
@@ -145,9 +145,8 @@ def falsify(
     note_llm(settings if chat is None else None)
     if base is not None and len(groups) > 1:
         check_unused(base)
-    results: dict[str, Result] = {}
-    for group in groups:
-        request = RunRequest(
+    requests = [
+        RunRequest(
             problems=_sources(group) if directory is not None else (),
             engine=name,
             llm=settings,
@@ -156,6 +155,10 @@ def falsify(
             jobs=jobs,
             start_from=tuple(_fitted(group[0].space, each).to_json() for each in known),
         )
+        for group in groups
+    ]
+    results: dict[str, Result] = {}
+    for group, request in zip(groups, requests, strict=True):
         place = base / file_name(group[0].name) if base is not None and len(groups) > 1 else base
         found = carry_out(request, group, place, engine=made, chat=chat, listeners=listeners)
         results |= {result.problem.name: result for result in found}
@@ -374,9 +377,13 @@ def _changed(budget: Budget, given: Budget | int, place: Path) -> Budget:
 
 
 def _fitted(space: SearchSpace, candidate: Candidate) -> Candidate:
-    fitted = fit(space, candidate)
+    given = written(f"--inputs {candidate.rationale}", "start_from")
+    try:
+        fitted = fit(space, candidate)
+    except CandidateError as error:
+        raise CandidateError(f"{given}: {error}") from None
     for note in fitted.notes:
-        _LOG.warning("start_from: %s", note)
+        _LOG.warning("%s: %s", given, note)
     return fitted.candidate
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
+from math import isnan
 from pathlib import Path
 from typing import Generic, Literal, TypeVar
 
@@ -13,7 +14,7 @@ from falsifier.record import records
 from falsifier.record.journal import JournalReader
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Failure, Finding, failures
-from falsifier.search.result import ResultStatus
+from falsifier.search.result import ResultStatus, mostly_unjudged
 from falsifier.stl.monitor import Verdict
 
 RunStatus = ResultStatus | Literal["waiting", "running"]
@@ -75,7 +76,7 @@ class Summary:
         """Update the numbers with one record."""
         if self.counterexample is not None:
             return
-        self.status = "running"
+        self.status, self.reason, self.findings = "running", "", ()  # not those before it was resumed
         self.spent = replace(self.spent, seconds=records.elapsed_at(record))
         match record:
             case records.EvaluatedRecord():
@@ -94,6 +95,9 @@ class Summary:
                 self.spent += Spent.on_requests(exchange.requests, exchange.usage)
             case records.EndedRecord():
                 self.status, self.reason, self.spent = record.status, record.reason, record.spent
+                unjudged = mostly_unjudged([None if isnan(r) else r for r in self._robustness])
+                if record.status == "not falsified" and unjudged:  # as in the result
+                    self.status, self.reason = "failed", unjudged
                 own = [found for name, found in record.findings.items() if self.recorded_as in (None, name)]
                 self.findings = tuple(each for found in own for each in found)
 

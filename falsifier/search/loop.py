@@ -275,11 +275,13 @@ class _Loop:
         Simulations end in the order in which they were asked for, so that a run does not depend on which one
         is faster. Those that are still under way when the search ends are not counted.
         """
-        evaluation = wait()
-        with undisturbed() if evaluation.seconds >= _WORTH_KEEPING else nullcontext():
+        simulated = wait()
+        with undisturbed() if simulated.seconds >= _WORTH_KEEPING else nullcontext():
             # Also against the one whose engine proposed it, because a resumed run needs that verdict.
             judges = standing if asked in standing else [asked, *standing]
-            judged = [(s, evaluation if s is asked else judge(s.problem, evaluation)) for s in judges]
+            known = asked if simulated.verdict is not None else None  # whose verdict it has
+            judged = [(s, simulated if s is known else judge(s.problem, simulated)) for s in judges]
+            evaluation = next(seen for s, seen in judged if s is asked)
             improved = [state.note(seen) for state, seen in judged if state.counterexample is None]
             failed = all(seen.status != "ok" for _, seen in judged)
             self.last_error = evaluation.reason if failed else self.last_error
@@ -319,7 +321,7 @@ class _Loop:
         """Check a violation of one requirement; a fragile or refuted one does not end the search for it."""
         confirmation = self.steps.confirm(state.problem, evaluation, self.count - 1)
         with undisturbed():
-            spent = self.clock()
+            spent = self.steps.spent.get((self.count - 1, state.problem.name)) or self.clock()
             if confirmation.outcome == "confirmed":
                 state.counterexample, state.spent = confirmation, spent
             else:

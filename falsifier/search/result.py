@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from falsifier.core.signals import Signal
 from falsifier.core.space import SearchSpace
-from falsifier.core.words import readable, resolving
+from falsifier.core.words import counted, readable, resolving
 from falsifier.engines.protocol import Engine, HasRemarks
 from falsifier.errors import SpecError
 from falsifier.evaluation.confirm import Confirmation
@@ -144,6 +144,8 @@ class RequirementState:
         requirement that was falsified has its own status and reason.
         """
         found, findings = self.counterexample, list[Finding]()
+        if status == "not falsified" and (why := mostly_unjudged([e.robustness for e in self.evaluations])):
+            status, reason = "failed", why
         if self.best is not None and found is None:
             limits = inexpressible(self.problem, used)
             findings = [*self.vacuity.findings(is_all=is_all), *([limits] if limits else [])]
@@ -162,6 +164,16 @@ class RequirementState:
             directory=directory,
             remarks=self.engine.remarks(self.evaluations) if isinstance(self.engine, HasRemarks) else (),
         )
+
+
+def mostly_unjudged(robustness: Sequence[float | None]) -> str:
+    """Say that a requirement could not be judged in more than half of the simulations; empty if it could.
+
+    Others may have been, of the same search.
+    """
+    lost = sum(value is None for value in robustness)
+    whole = counted(len(robustness), "simulation")
+    return f"{lost} of {whole} could not be judged" if 2 * lost > len(robustness) else ""
 
 
 def evaluation_columns(evaluations: Sequence[Evaluation]) -> Columns:

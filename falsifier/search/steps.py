@@ -1,6 +1,6 @@
 """The steps of the loop that touch the world: asking engines, simulating, confirming."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field
 from time import perf_counter
@@ -27,6 +27,8 @@ class Steps:
     seconds: float = 0.0  # wall-clock seconds of the recorded part of the run
     # Recorded exchanges with a language model, which are played back first.
     exchanges: Iterator[Exchange] = field(default_factory=lambda: iter(()))
+    # What had been spent when a violation was confirmed, by evaluation index and requirement, as recorded.
+    spent: Mapping[tuple[int, str], Spent] = field(default_factory=dict)
     # What the recorded part spent on questions to a language model that are not played back.
     unrepeated: Spent = field(default_factory=Spent)
 

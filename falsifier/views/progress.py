@@ -188,11 +188,14 @@ class News:
 
 
 def log_fmu(path: Path) -> events.Listener:
-    """Make a listener that writes the FMU's messages of each simulation to a file, which a run replaces."""
+    """Make a listener that writes the FMU's messages of each simulation to a file, which it replaces."""
+    is_begun = False  # by the first of the runs that follow each other
 
     def append(event: events.Event) -> None:
-        if isinstance(event, events.RunStarted):
+        nonlocal is_begun
+        if isinstance(event, events.RunStarted) and not is_begun:
             path.write_text("", encoding="utf-8")
+            is_begun = True
         if isinstance(event, events.Evaluated):
             evaluation = event.evaluation
             why = "" if evaluation.status == "ok" else f": {evaluation.reason}"

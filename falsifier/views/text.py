@@ -235,7 +235,7 @@ def assurance_json(found: Assurance) -> dict[str, Any]:
 
 def _can_continue(result: Result) -> bool:
     if result.status == "failed":
-        return bool(result.evaluations) and not result.spent.has_mostly_failed
+        return 0 < len(result.evaluations) >= 2 * sum(failure.count for failure in result.failures)
     return result.status == "interrupted"
 
 

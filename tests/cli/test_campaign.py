@@ -11,6 +11,7 @@ from falsifier.record.run import falsify
 from falsifier.testing import lag_problem
 from tests.cli.support import HARD, NEVER, bench
 from tests.command import falsifier
+from tests.problems import mostly_broken
 
 
 def test_bench_prints_and_saves_the_tables(command: Any, tmp_path: Path) -> None:
@@ -172,6 +173,11 @@ def test_watch_follows_single_runs_too(command: Any, tmp_path: Path) -> None:
     assert "LAG surrogate, shared search seed 0: " in result.stdout
     assert "2/3 runs finished, 1 falsified, 8 simulations" in result.stdout
     assert "stopped; to continue: falsifier resume r" in result.stdout
+
+
+def test_watch_continues_nothing_that_most_failed_simulations_have_ended(command: Any) -> None:
+    falsify(lag_problem(response=mostly_broken), "uniform", budget=20, directory="r")
+    assert "failed after 20 simulations" in (out := command("watch", "r").stdout) and "stopped" not in out
 
 
 def test_watch_ends_where_nobody_works_on(command: Any, tmp_path: Path) -> None:

@@ -309,6 +309,7 @@ def test_a_shrinking_that_was_killed_leaves_no_explanation_of_another_input(
 ) -> None:
     monkeypatch.chdir(folder)
     run(folder, "explain", "run", code=0)
+    assert _carried_out(["explain", "run", "--shrink", "--budget", "3", "--out", "else.json"]) == 0
     assert Path("run/explanation.txt").exists()
     monkeypatch.setattr("falsifier.cli.counterexample.save", killed)
     assert _carried_out(["explain", "run", "--shrink", "--budget", "3"]) == 130

@@ -1,9 +1,15 @@
 import csv
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from falsifier.campaigns.analysis import load
+from falsifier.cli.report import _evaluations_csv
+from falsifier.core.function_model import FunctionModel
+from falsifier.core.model import Variable
+from falsifier.record.run import falsify
+from falsifier.testing import BIAS, lag_problem
 from tests.cli.support import NEVER, bench
 from tests.command import falsifier
 
@@ -49,6 +55,19 @@ def test_every_evaluation_is_written_as_a_table(command: Any, campaign: Path, tm
         own = [r for r in rows if (r["requirement"], r["method"], r["seed"]) == name]
         assert [float(r["robustness"]) for r in own] == run.robustness.tolist()
         assert all(r["critical_time"] for r in own)
+
+
+def test_what_is_varied_has_a_column_beside_what_identifies_its_run(tmp_path: Path) -> None:
+    plain = lag_problem(inputs=0, parameters=[BIAS])
+    seed = Variable("seed", causality="parameter", start=0.0, settable=True)
+    info = replace(plain.info, variables=(*plain.info.variables, seed))
+    model = FunctionModel(lambda times, *_: {"x": 0 * times}, info)
+    space = replace(plain.space, parameters=(replace(BIAS, name="seed"),))
+    problem = replace(plain, model=model, space=space)
+    result = falsify(problem, "uniform", budget=2, seed=7, directory=tmp_path)
+    rows = list(csv.DictReader(_evaluations_csv([tmp_path]).splitlines()))
+    assert [row["seed"] for row in rows] == ["7", "7"]
+    assert [float(row["seed (varied)"]) for row in rows] == result.columns()["seed"]
 
 
 def test_directories_are_compared_in_one_page(command: Any, campaign: Path, tmp_path: Path) -> None:

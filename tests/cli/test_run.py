@@ -16,7 +16,7 @@ from falsifier.cli import cli
 from falsifier.cli.files import new_directory
 from falsifier.core.files import bundled
 from falsifier.errors import JournalError
-from falsifier.record.journal import read_journal
+from falsifier.record.journal import read_journal, recorded_candidates
 from falsifier.record.run import falsify
 from falsifier.testing import lag_problem
 from tests.command import ROOT, falsifier, listen_to_interrupts
@@ -224,6 +224,19 @@ def test_a_folder_of_runs_is_told_from_one_of_them(tmp_path: Path) -> None:
     assert "is a folder of runs; give one of them: A, other" in falsifier("resume", ".", cwd=work, code=2).err
     elsewhere = falsifier("resume", "work/runs/A", cwd=tmp_path, code=2)
     assert "several.toml, which is not seen from this folder" in elsewhere.err
+
+
+def test_searches_that_follow_each_other_share_known_inputs_and_one_log(tmp_path: Path) -> None:
+    shutil.copy(bundled("fmus") / "AT.fmu", tmp_path)
+    (tmp_path / "u.csv").write_text("time,throttle\n0,0\n25,80\n50,0\n")
+    finer = "inputs.throttle = { range = [0, 100], control_points = 3 }"
+    (tmp_path / "several.toml").write_text(SEVERAL.replace("stop_time = 12.0", finer))
+    options = ("--engine", "corners", "--budget", "1", "--fmu-log", "log", "--inputs", "u.csv")
+    done = falsifier("run", "several.toml", *options, "--out", "r", cwd=tmp_path, code=0)
+    assert "--inputs from u.csv: throttle is sampled at 2 control points" in done.err
+    (candidate,) = recorded_candidates(read_journal(tmp_path / "r" / "B")).values()
+    assert candidate.signals["throttle"].values == (0.0, 80.0, 0.0)
+    assert (tmp_path / "log").read_text().count("simulation 1: ok") == 2
 
 
 def test_messages_of_the_fmu_replace_no_file_but_earlier_ones(tmp_path: Path) -> None:

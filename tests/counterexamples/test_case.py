@@ -4,9 +4,9 @@ import pytest
 
 from falsifier import falsify
 from falsifier.core.signals import Signal
-from falsifier.counterexamples.case import case_of, known_inputs
+from falsifier.counterexamples.case import case_of, read_known
 from falsifier.counterexamples.store import save, to_store
-from falsifier.errors import CandidateError, JournalError, SpecError
+from falsifier.errors import JournalError, SpecError
 from falsifier.evaluation.confirm import confirm
 from falsifier.evaluation.evaluate import simulate
 from falsifier.testing import lag_problem
@@ -64,26 +64,21 @@ def test_a_system_that_violates_now_is_said_to_have_changed(tmp_path: Path) -> N
         case_of(tmp_path).simulated(lag_problem("G[0,10] (x <= 0.1)", name="NEVER"))
 
 
-def test_a_csv_file_is_fitted_and_says_where_it_is_from(tmp_path: Path) -> None:
+def test_a_csv_file_is_read_as_it_is_and_says_what_is_added(tmp_path: Path) -> None:
     file = tmp_path / "u.csv"
     file.write_text("t,u\n0,-1\n10,1\n")
-    fitted = known_inputs(file, lag_problem(points=3))
-    assert fitted.candidate.signals["u"].values == pytest.approx((-1, 0, 1))
-    assert (fitted.candidate.origin, fitted.candidate.rationale) == ("known", f"from {file}")
+    found, notes = read_known(file, lag_problem(points=3))
+    assert (found.signals["u"].values, notes) == ((-1.0, 1.0), [])
     file.write_text("t,u\n0,-1\n5,0\n")
-    assert (
-        "ends at 5 s; the last values are kept until 10 s" in known_inputs(file, lag_problem(points=3)).notes
-    )
-    file.write_text("t,u\n0,-1\n10,3\n")
-    with pytest.raises(CandidateError, match=r"u\.csv: input 'u' at t = 10 s: 3 is outside"):
-        known_inputs(file, lag_problem(points=3))
+    _, notes = read_known(file, lag_problem(points=3))
+    assert notes == ["ends at 5 s; the last values are kept until 10 s"]
 
 
 def test_a_counterexample_file_is_taken_as_it_is(tmp_path: Path) -> None:
     problem = lag_problem(points=1)
     violation = simulate(problem, {"u": Signal((0.0,), (1.0,), "linear")})
     file = save(to_store(confirm(problem, violation)), tmp_path / "counterexample.json")
-    assert known_inputs(file, problem).candidate.signals["u"].values == (1.0,)
+    assert read_known(file, problem)[0].signals["u"].values == (1.0,)
 
 
 def test_a_run_of_which_nothing_was_judged_has_no_nearest_miss(tmp_path: Path) -> None:

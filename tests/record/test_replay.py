@@ -155,12 +155,26 @@ def test_trajectories_that_were_not_kept_are_simulated_at_the_same_time(
         together.wait(HANG)
         return evaluate(problem, candidate)
 
-    monkeypatch.setattr("falsifier.evaluation.workers.evaluate_any", simulated)
+    monkeypatch.setattr("falsifier.evaluation.workers.evaluate_for_all", simulated)
     events: list[Event] = []
     (resumed,) = resume(tmp_path, problems=[PROBLEM], listeners=[events.append])
     assert keys(resumed) == keys(whole)
     evaluated = [event.evaluation for event in events if isinstance(event, Evaluated)]
     assert len(evaluated) == 6 and all(each.trajectory is not None for each in evaluated)
+
+
+def test_a_simulation_that_must_be_repeated_and_now_fails_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run(PROBLEM, tmp_path, budget=3)
+    shutil.rmtree(tmp_path / "trajectories")
+
+    def fails(_problem: Problem, candidate: Candidate) -> Evaluation:
+        return Evaluation(candidate, "timeout", reason="60 s")
+
+    monkeypatch.setattr("falsifier.evaluation.workers.evaluate_for_all", fails)
+    with pytest.raises(JournalError, match=r"simulation 1, whose .* not kept, now timed out: 60 s"):
+        resume(tmp_path, problems=[PROBLEM])
 
 
 def test_kept_trajectories_are_read_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

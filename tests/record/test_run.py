@@ -11,13 +11,15 @@ from typing import Any
 import pytest
 from numpy import int64
 
+from falsifier.core.candidate import Candidate
 from falsifier.core.experiment import Experiment
 from falsifier.core.files import bundled
+from falsifier.core.signals import Signal
 from falsifier.core.trajectory import Trajectory
 from falsifier.counterexamples.store import changes_since, load_counterexample
 from falsifier.engines import make_engine
 from falsifier.engines.protocol import Engine
-from falsifier.errors import JournalError, SimulationError, SpecError
+from falsifier.errors import CandidateError, JournalError, SimulationError, SpecError
 from falsifier.llm.scripted import ScriptedChat
 from falsifier.problem.loading import load_problem
 from falsifier.problem.problem import Problem
@@ -110,6 +112,14 @@ def test_problems_that_cannot_share_a_search_have_a_directory_each(tmp_path: Pat
     assert {p.name for p in tmp_path.iterdir() if holds_run(p)} == {"NEVER", "APART"}
     falsify([impossible(), hard()], "corners", budget=2, directory=tmp_path / "shared")
     assert manifest.read(tmp_path / "shared").names == ("NEVER", "HARD")
+
+
+def test_known_candidates_are_fitted_to_each_group_before_any_is_searched(tmp_path: Path) -> None:
+    known = Candidate({"u": Signal((0.0, 10.0), (-1.0, 1.0), "linear")})
+    narrow = lag_problem(limit=0.5, name="NARROW")
+    with pytest.raises(CandidateError, match="start_from: input 'u' at t = 0 s: -1 is outside"):
+        falsify([impossible(), narrow], "corners", start_from=[known], directory=tmp_path)
+    assert not any(tmp_path.iterdir())
 
 
 def test_whoever_interrupts_a_search_in_groups_stops_it_and_can_resume_all_of_it(tmp_path: Path) -> None:

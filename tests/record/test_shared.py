@@ -1,5 +1,6 @@
 """Several requirements falsified in one search are a run for each of them."""
 
+import shutil
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -13,6 +14,7 @@ from falsifier.record.run import falsify, resume
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem
 from falsifier.views.report import html_report, markdown_report
+from falsifier.views.text import results_text
 from tests.problems import hard, impossible
 
 PROBLEMS = (impossible(), hard(), lag_problem("G[0,10] (x <= 0.8)", name="HARDER"))
@@ -101,9 +103,28 @@ def test_a_resumed_search_says_the_same(tmp_path: Path, runs: dict[str, Run]) ->
     search(tmp_path, stop_at=12)
     assert {run.status for run in load(tmp_path)} >= {"interrupted"}
     search(tmp_path)
+    again = {result.problem.name: result for result in search(tmp_path)}
     for run in load(tmp_path):
+        if run.falsified:
+            assert again[run.requirement].spent.seconds == run.spent.seconds
         assert run.robustness.tolist() == runs[run.requirement].robustness.tolist()
         assert (run.status, run.reason) == (runs[run.requirement].status, runs[run.requirement].reason)
+
+
+def test_what_one_requirement_cannot_judge_is_judged_by_the_others(tmp_path: Path) -> None:
+    problems = [lag_problem("G[0,10] (sqrt(x - 5) >= 0)", name="BLIND"), impossible()]
+    found = falsify(problems, "uniform", budget=5, directory=tmp_path)
+    for _ in range(2):
+        assert [result.status for result in found] == ["failed", "not falsified"]
+        assert found[0].reason == "5 of 5 simulations could not be judged"
+        assert "to continue" not in results_text(found)
+        assert [e.robustness is None for e in found[1].evaluations] == [False] * 5
+        for run, result in zip(load(tmp_path), found, strict=True):
+            assert (run.status, run.reason) == (result.status, result.reason)
+            assert run.columns()["status"] == [e.status for e in result.evaluations]
+            assert all(map(bool, run.columns()["reason"])) == (run.requirement == "BLIND")
+        shutil.rmtree(tmp_path / "trajectories")
+        found = resume(tmp_path, problems=problems)
 
 
 def test_a_folder_of_runs_is_all_of_them(tmp_path: Path, results: dict[str, Result]) -> None:

@@ -3,6 +3,7 @@ from falsifier.llm.messages import ChatReply, Exchange, Message, Usage
 from falsifier.record import records
 from falsifier.record.summary import Summary
 from falsifier.search.budget import Spent
+from falsifier.search.findings import Finding
 from falsifier.stl.monitor import Verdict
 
 
@@ -56,6 +57,18 @@ def test_a_growing_journal_is_counted_line_by_line() -> None:
     assert summary.counterexample == 4
     assert summary.unconfirmed == {2: "fragile: vanishes"}
     assert (summary.status, summary.spent.seconds, summary.spent.cost) == ("falsified", 9.0, None)
+
+
+def test_what_a_search_could_not_show_before_it_was_resumed_is_forgotten() -> None:
+    summary, untested = Summary(), Finding(kind="disjunct", text="x <= 1 always held")
+    ended = {"status": "interrupted", "reason": "stopped", "spent": Spent(), "findings": {"R": [untested]}}
+    before: list[records.Record] = [asked(0, 1), evaluated(0, 2.0), records.EndedRecord.model_validate(ended)]
+    for record in before:
+        summary.add(record)
+    assert list(summary.findings) == [untested]
+    for later in (asked(1, 1), evaluated(1, -3.0), confirmed(1, "confirmed", "yes", Spent())):
+        summary.add(later)
+    assert (status(summary), list(summary.findings)) == ("falsified", [])
 
 
 def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:
