@@ -3,6 +3,7 @@
 import re
 from bisect import bisect_left
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import ceil, floor, inf, isfinite, log2, log10
 from numbers import Real
@@ -137,7 +138,8 @@ def margin(
         complete = state.narrowed()
     except KeyboardInterrupt:
         interrupted = True
-        state.judge_all()  # what the search that was stopped has simulated counts, too
+        with suppress(KeyboardInterrupt):  # whoever does not wait for it gets what is known
+            state.judge_all()  # what the search that was stopped has simulated counts, too
     failed = [evaluation for evaluation in state.history if evaluation.status != "ok"]
     if not interrupted and 2 * len(failed) > len(state.history):
         some = f"{len(failed)} of {counted(len(state.history), 'simulation')}"

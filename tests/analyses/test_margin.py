@@ -173,3 +173,12 @@ def test_a_search_whose_few_simulations_fail_is_one_in_vain_if_most_of_all_do_no
     problem = lag_problem(inputs=0, parameters=[BIAS], response=some)
     found = margin(problem, "G[0,10] (x <= {limit})", (-3, 3), engine="uniform", budget=20)
     assert found.falsified_at is not None and found.simulations == 20
+
+
+def test_whoever_stops_it_again_gets_what_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("falsifier.analyses.margin.confirm", stop)
+    found = margin(lag_problem(), "G[0,10] (x <= {limit})", (0.0, 3.0), engine="corners", budget=60)
+    assert found.interrupted and found.text.endswith("stopped by the user")
