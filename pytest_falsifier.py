@@ -42,7 +42,7 @@ class RequirementWarning(UserWarning):
 
 
 class UntestedWarning(RequirementWarning):
-    """A requirement was not violated, but a part of it was not tested, or simulations failed."""
+    """A requirement was not falsified, but a part of it was not tested, or simulations failed."""
 
 
 class UnconfirmedWarning(RequirementWarning):
@@ -377,7 +377,7 @@ def _tell_doubts(item: pytest.Item, checked: "Checked", *, strict: bool) -> None
     unconfirmed += [f"{c.outcome}: {c.reason}" for c in (*result.fragile, *result.refuted)] if result else []
     told: list[tuple[type[RequirementWarning], str, list[str]]] = [
         (UnconfirmedWarning, f"{name} was violated, but no violation is confirmed", unconfirmed),
-        (UntestedWarning, f"{name} is not violated, but not all of it was tested", untested),
+        (UntestedWarning, f"{name} is not falsified, but not all of it was tested", untested),
     ]
     texts = {kind: "\n".join((said, *lines)) for kind, said, lines in told if lines}
     if texts and strict:

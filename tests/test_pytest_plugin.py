@@ -261,7 +261,7 @@ def test_what_no_simulation_tested_is_a_warning_and_with_strict_an_error(
     checked = check(lag_problem("G[0,10] (x >= 2 -> u <= 0)"), engine="uniform", budget=2)
     with pytest.warns(UntestedWarning, match="The condition x >= 2 never held in 2 simulations"):
         _tell_doubts(request.node, checked, strict=False)
-    with pytest.raises(UntestedError, match="LAG is not violated, but not all of it was tested"):
+    with pytest.raises(UntestedError, match="LAG is not falsified, but not all of it was tested"):
         _tell_doubts(request.node, checked, strict=True)
     half = check(lag_problem("G[0,10] (x <= 2)", response=broken), engine="uniform", budget=7)
     with pytest.raises(UntestedError, match=r"not all of it was tested\n2 simulations failed, .*x' is nan"):
@@ -276,6 +276,11 @@ def test_a_violation_that_is_not_confirmed_is_a_warning_and_with_strict_an_error
     assert checked.counterexample is None and checked.result is not None
     with pytest.warns(UnconfirmedWarning, match="no violation is confirmed\nfragile: .*does not violate"):
         _tell_doubts(request.node, checked, strict=False)
+    lost = [replace(each, status="failed", reason="lost") for each in checked.result.evaluations]
+    partly = replace(checked, result=replace(checked.result, evaluations=tuple(lost)))
+    with pytest.raises(UntestedError, match="LAG was violated, but") as told:
+        _tell_doubts(request.node, partly, strict=True)
+    assert "LAG is not falsified, but" in str(told.value) and "not violated" not in str(told.value)
     file = database.save(problem, to_store(checked.result.fragile[0]))
     stored = check(problem, engine="uniform", budget=1, database=database)
     with pytest.raises(UntestedError, match=f"{file.name}: LAG: fragile"):

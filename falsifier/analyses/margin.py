@@ -3,6 +3,7 @@
 import re
 from bisect import bisect_left
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import ceil, floor, inf, isfinite, log2, log10
 from numbers import Real
@@ -30,6 +31,8 @@ LIMIT = "{limit}"
 RESOLUTION = 0.01
 # Thresholds are this share of that apart, or a power of ten below it, so that they can be told exactly.
 _FINEST = 0.01
+# Violations of a threshold that are tried to confirm, the clearest first: few may be of no use, not all.
+_TRIED = 3
 
 OnSearch = Callable[[float, bool, int], None]
 
@@ -135,7 +138,12 @@ def margin(
         complete = state.narrowed()
     except KeyboardInterrupt:
         interrupted = True
-        state.judge_all()  # what the search that was stopped has simulated counts, too
+        with suppress(KeyboardInterrupt):  # whoever does not wait for it gets what is known
+            state.judge_all()  # what the search that was stopped has simulated counts, too
+    failed = [evaluation for evaluation in state.history if evaluation.status != "ok"]
+    if not interrupted and 2 * len(failed) > len(state.history):
+        some = f"{len(failed)} of {counted(len(state.history), 'simulation')}"
+        raise SimulationError(f"{problem.name}: {some} failed; the last error: {failed[-1].reason}")
     falsified = None if state.reached < 0 else thresholds[state.reached]
     unfalsified = thresholds[state.hard] if state.hard < len(thresholds) else None
     return Margin(falsified, unfalsified, len(state.history), tuple(state.searches), complete, interrupted)
@@ -176,6 +184,13 @@ class _Bisection:
     in_vain: set[int] = field(default_factory=set)
     history: list[Evaluation] = field(default_factory=list)
     searches: list[tuple[float, bool]] = field(default_factory=list)
+    # Whether a violation was confirmed, by threshold and candidate.
+    confirmed: dict[tuple[int, object], bool] = field(default_factory=dict)
+
+    @property
+    def close(self) -> int:
+        """How many thresholds may lie between the two that are told, and one."""
+        return max(1, floor(RESOLUTION * (len(self.thresholds) - 1)))
 
     @property
     def hard(self) -> int:
@@ -188,15 +203,13 @@ class _Bisection:
         Returns:
             Whether that is all there is to know; False: the budget is used up before.
         """
-        last = len(self.thresholds) - 1
-        close = max(1, floor(RESOLUTION * last))
-        self._search(last, 2 + ceil(log2(1 / RESOLUTION)))
+        self._search(len(self.thresholds) - 1, 2 + ceil(log2(1 / RESOLUTION)))
         if self.reached < 0:
             self._search(0, 1)  # it ends with the first violation; without one there is nothing to narrow
-        while 0 <= self.reached < self.hard - close:
+        while 0 <= self.reached < self.hard - self.close:
             if len(self.history) >= self.budget:
                 return False
-            self._search((self.reached + self.hard) // 2, ceil(log2((self.hard - self.reached) / close)))
+            self._search((self.reached + self.hard) // 2, ceil(log2((self.hard - self.reached) / self.close)))
         return True
 
     def _search(self, k: int, searches: int) -> None:
@@ -213,8 +226,6 @@ class _Bisection:
         (result,) = search([problem], [engine], Budget(max(1, budget)), listeners=[remember])
         if result.status == "interrupted":
             raise KeyboardInterrupt
-        if result.status == "failed":
-            raise SimulationError(f"{problem.name}: {result.reason}")
         self.searches.append((self.thresholds[k], result.falsified))
         if result.falsified:
             self.reached = max(self.reached, k)
@@ -233,9 +244,27 @@ class _Bisection:
         return [judge(problem, evaluation) for evaluation in self.history]
 
     def judge_all(self) -> None:
-        """Look for a harder threshold that something simulated already violates, if that is confirmed."""
-        known = range(max(self.reached, 0), len(self.thresholds))
-        count = bisect_left(known, 1, key=lambda k: not any(e.violated for e in self._judged(k)))
-        if count and (k := known[count - 1]) > self.reached:
-            found = min(self._judged(k), key=lambda e: inf if e.robustness is None else e.robustness)
-            self.reached = k if confirm(self._at(k), found).outcome == "confirmed" else self.reached
+        """Look for a harder threshold that something simulated already violates, if that is confirmed.
+
+        Of the hardest one, the violation is slight and may be fragile; then for an easier one.
+        """
+        harder = range(self.reached + 1, len(self.thresholds))
+        violated = harder[
+            : bisect_left(harder, 1, key=lambda k: not any(e.violated for e in self._judged(k)))
+        ]
+        some = [k for k in violated if k % self.close == 0 or k == self.hard]
+        if not violated or self._is_confirmed(violated[-1]):
+            self.reached += len(violated)
+        elif count := bisect_left(some, 1, key=lambda k: not self._is_confirmed(k)):
+            self.reached = some[count - 1]
+
+    def _is_confirmed(self, k: int) -> bool:
+        problem = self._at(k)
+        found = [(e.robustness, e) for e in self._judged(k) if e.robustness is not None and e.violated]
+        for _, evaluation in sorted(found, key=lambda pair: pair[0])[:_TRIED]:
+            key = k, evaluation.candidate.key
+            if key not in self.confirmed:
+                self.confirmed[key] = confirm(problem, evaluation).outcome == "confirmed"
+            if self.confirmed[key]:
+                return True
+        return False

@@ -204,7 +204,7 @@ def _exported(run: Run) -> dict[str, object]:
         "simulations": run.simulations,
         "simulation time": f"{run.spent.simulation_seconds:.6g}",
         "total time": f"{run.spent.seconds:.6g}",
-        "robustness": repr(run.verdict.robustness) if run.verdict else "",
+        "robustness": "" if run.best_robustness is None else repr(run.best_robustness),
         "stop time": f"{run.manifest.stop_time:.10g}",
     }
     if run.counterexample is not None:

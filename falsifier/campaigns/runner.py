@@ -1,6 +1,7 @@
 """Runs and resumes campaigns."""
 
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -16,6 +17,7 @@ from falsifier.campaigns.progress import Follower, Progress
 from falsifier.campaigns.request import CampaignRequest, method_of
 from falsifier.campaigns.schedule import PATIENCE, RunTask, Schedule
 from falsifier.core.arguments import instance, list_of, path_of, whole
+from falsifier.core.words import counted
 from falsifier.counterexamples.store import keep_recorded
 from falsifier.errors import SpecError, written
 from falsifier.evaluation.workers import open_workers
@@ -155,17 +157,22 @@ def _work(
             tasks.append(RunTask(run.name, request, problems[source], hashes[source], directory.absolute()))
         elif run.falsified:  # its counterexample is missing if the process was killed just after it ended
             keep_recorded(run_directory(directory, run.name), begun_here=True)
-    with open_workers(jobs) as workers:
-        schedule = Schedule(tasks, workers)
+    with ExitStack() as stack:
+        stack.callback(stop.unlink, missing_ok=True)
+        schedule = Schedule(tasks, stack.enter_context(open_workers(jobs)))
         try:
             schedule.run(report, tick)
         except KeyboardInterrupt:
             stop_all("stopped by the user")
             schedule.run(report, lambda: False)
-    progress = Follower(directory).look()  # Ctrl-C may have stopped the other one within a line
-    for listener in listeners:
-        listener(progress)
-    stop.unlink(missing_ok=True)
+        except BaseException as error:  # such as a full disk: the workers, which are awaited, need not go on
+            stop_all(f"{type(error).__name__}: {error}")
+            raise
+        progress = Follower(directory).look()  # Ctrl-C may have stopped the other one within a line
+        for listener in listeners:
+            listener(progress)
+    if alone := progress.counts["interrupted"]:
+        reason = reason or f"{counted(alone, 'run')} stopped alone"
     return CampaignEnd(progress, reason if progress.finished < len(progress.runs) else "")
 
 
@@ -229,7 +236,7 @@ def _hashes(problems: Mapping[ProblemSource, Problem]) -> dict[str, str]:
 def _record_failure(directory: Path, task: RunTask, reason: str) -> None:
     """Record in a run's journal why it failed, if its worker could not do so."""
     (summary,) = RunFollower(directory, [Summary()]).look()
-    if summary.status not in ("waiting", "running"):
+    if summary.finished or (summary.status == "failed" and summary.reason.endswith(reason)):
         return
     with open_journal(directory, keep=task.request.keep, patience=PATIENCE) as journal:
         if not holds_run(directory):

@@ -5,6 +5,7 @@ A search shared by several requirements appears as one run per requirement.
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import count
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -123,12 +124,15 @@ def load(directory: str | PathLike[str]) -> list[Run]:
     """
     places = run_directories(path_of("directory", directory))
     runs = [run for place in places for run in RunFollower(place, unread_runs(place)).look()]
-    formulas: dict[str, dict[str, None]] = {}
+    formulas: dict[str, dict[str, str]] = {}
     for run in runs:
-        formulas.setdefault(run.requirement, {})[run.manifest.requirement.formula] = None
-    for run in runs:  # runs of --stl all have the same name
-        if len(known := [*formulas[run.requirement]]) > 1:
-            run.requirement += f"-{known.index(run.manifest.requirement.formula) + 1}"
+        formulas.setdefault(run.requirement, {})[run.manifest.requirement.formula] = run.requirement
+    for name, numbered in formulas.items():  # runs of --stl all have the same name
+        unused = (new for k in count(1) if (new := f"{name}-{k}") not in formulas)
+        if len(numbered) > 1:
+            numbered.update(zip([*numbered], unused, strict=False))
+    for run in runs:
+        run.requirement = formulas[run.requirement][run.manifest.requirement.formula]
     return runs
 
 

@@ -41,7 +41,7 @@ class Statistics:
         deviation: sample standard deviation of the same; None below two falsified runs.
         rate_interval: 95 % Wilson interval of the share of falsified runs; None below five finished runs.
         mean_interval: 95 % percentile bootstrap interval of the mean; None below five falsified runs.
-        smallest_robustness: smallest robustness of any run.
+        smallest_robustness: smallest robustness of any run, without violations that were not confirmed.
         spent: what the runs have spent together.
         budgets: the different limits on the simulations of a run, in ascending order.
         known: number of runs that began with known inputs.
@@ -80,7 +80,7 @@ def statistics(runs: Iterable[RunProgress]) -> Statistics:
         deviation=float(counts.std(ddof=1)) if counts.size > 1 else None,
         rate_interval=wilson(len(counts), len(finished)) if len(finished) >= _FEWEST_RUNS else None,
         mean_interval=bootstrap(counts) if counts.size >= _FEWEST_RUNS else None,
-        smallest_robustness=min((run.verdict.robustness for run in runs if run.verdict), default=None),
+        smallest_robustness=min((r for run in runs if (r := run.best_robustness) is not None), default=None),
         spent=sum((run.spent for run in finished), Spent()),
         budgets=tuple(sorted({limit for run in runs if (limit := run.request.budget.simulations)})),
         known=sum(bool(run.request.start_from) for run in finished),

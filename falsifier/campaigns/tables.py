@@ -256,7 +256,8 @@ _LEGEND = (
     "FR: falsified runs / finished runs (those that falsified, spent their budget or tried all candidates). "
     "Budget: limit on the simulations of a run; several if runs differ. S: simulations per falsified run; "
     "std is the sample standard deviation. Intervals, from five runs on: Wilson for FR, percentile bootstrap "
-    "for the mean. Best robustness: the smallest of all runs. Seconds, tokens and cost are means per run."
+    "for the mean. Best robustness: the smallest of all runs, without violations that were not confirmed. "
+    "Seconds, tokens and cost are means per run."
 )
 _PUBLISHED_LEGEND = (
     "Rank: position among all published tools known for the requirement, by FR, then by mean S, whatever the "

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -249,7 +249,7 @@ def _interrupt(event: Event) -> None:
 
 
 class StopFile:
-    """Listener that interrupts a run, as Ctrl-C does, once a file exists; the run can be resumed."""
+    """Listener that interrupts a run, as Ctrl-C does, once a file says why; the run can be resumed."""
 
     def __init__(self, path: Path, budget: Budget) -> None:
         self._path, self._budget, self._looked = path, budget, monotonic()
@@ -258,8 +258,10 @@ class StopFile:
         """Look for the file after a simulation, but not after the last one, nor each of very quick ones."""
         if isinstance(event, Evaluated) and monotonic() - self._looked > _STOP_PERIOD:
             self._looked = monotonic()
-            if self._path.exists() and self._budget.exceeded(event.spent) is None:
-                raise KeyboardInterrupt
+            with suppress(FileNotFoundError):
+                why = self._path.read_text(encoding="utf-8", errors="replace").strip()
+                if self._budget.exceeded(event.spent) is None:
+                    raise KeyboardInterrupt(why)
 
 
 def carry_out(

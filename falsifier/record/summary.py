@@ -64,8 +64,13 @@ class Summary:
 
     @property
     def best_robustness(self) -> float | None:
-        """Smallest robustness so far."""
-        return None if self.best is None else self._robustness[self.best]
+        """Robustness of the counterexample; otherwise the smallest so far that is no violation.
+
+        A violation that is not confirmed, or not yet, is no result.
+        """
+        if self.counterexample is not None:
+            return self._robustness[self.counterexample]
+        return min((known for known in self._robustness if known >= 0), default=None)
 
     @property
     def shown(self) -> int | None:
@@ -106,8 +111,7 @@ class Summary:
         name = next(iter(judged)) if self.recorded_as is None else self.recorded_as
         verdict = judged[name]
         self._latest = verdict
-        smallest = self.best_robustness
-        if verdict is not None and (smallest is None or verdict.robustness < smallest):
+        if verdict is not None and (self.best is None or verdict.robustness < self._robustness[self.best]):
             self.best, self.verdict = record.index, verdict
         if record.trajectory is not None:
             self.trajectories[record.index] = record.trajectory

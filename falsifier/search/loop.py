@@ -76,7 +76,7 @@ def search(
         reason = loop.run(jobs)
         status, reason = loop.concluded(reason)
     except KeyboardInterrupt as stop:
-        status, reason = "interrupted", "stopped by the user"
+        status, reason = "interrupted", str(stop) or "stopped by the user"
         loop.count_lost(stop)
     except ChatError as error:
         status, reason = "failed", str(error)

@@ -35,20 +35,20 @@ class Scoreboard:
 
     def __init__(self, write: Write, update: Write | None = None) -> None:
         self._write, self._update = write, update
-        # What runs had spent when they ended, and which have ended for good or since the start.
-        self._ended: dict[str, Spent] | None = None
+        # What runs had spent when they ended, and why; which have ended for good or since the start.
+        self._ended: dict[str, tuple[Spent, str]] | None = None
         self._done: set[str] = set()
         self._written, self._overall = 0.0, ""
 
     def __call__(self, progress: Progress) -> None:
         """Write a line per run that ended since the last call."""
-        ended = {r.name: r.spent for r in progress.runs if r.status not in ("waiting", "running")}
+        ended = {r.name: (r.spent, r.reason) for r in progress.runs if r.status not in ("waiting", "running")}
         if self._ended is None:  # runs that ended before this start get no line, but those that are repeated
             self._ended, self._done = ended, {r.name for r in progress.runs if r.finished}
             self._write(f"{counted(len(progress.runs), 'run')}, {progress.finished} already finished")
         for run in progress.runs:
-            if run.name in ended and self._ended.get(run.name) != run.spent:
-                self._ended[run.name] = run.spent
+            if run.name in ended and self._ended.get(run.name) != ended[run.name]:
+                self._ended[run.name] = ended[run.name]
                 self._done.add(run.name)
                 self._write(f"[{len(self._done)}/{len(progress.runs)}] {run}")
         line = overall_line(progress)

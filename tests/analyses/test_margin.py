@@ -1,5 +1,6 @@
 from typing import Any
 
+import numpy as np
 import pytest
 
 from falsifier.analyses.margin import Margin, margin
@@ -143,3 +144,41 @@ def test_what_a_stopped_search_has_simulated_counts(monkeypatch: pytest.MonkeyPa
     found = margin(lag_problem(), "G[0,10] (x <= {limit})", (0.0, 3.0), engine="corners", budget=60)
     assert (found.interrupted, found.searches, found.simulations) == (True, (), 6)
     assert found.falsified_at is not None and 0.0 < found.falsified_at < 1.0
+
+
+@pytest.mark.parametrize(("extra", "above"), [(0.3, -1.0), (1.5, 0.98)])
+def test_a_clearer_violation_counts_where_that_of_a_harder_threshold_is_not_confirmed(
+    extra: float, above: float
+) -> None:
+    """Each input, or one of them, reaches more the first time, which no repetition confirms."""
+    known = set[float]()
+
+    def fading(times: Any, inputs: Any, parameters: dict[str, float]) -> dict[str, Any]:
+        bias, more = parameters["bias"], extra if parameters["bias"] >= above else 0.0
+        x = bias if bias in known else bias + more
+        known.add(bias)
+        return {"x": np.full(times.shape, x)}
+
+    problem = lag_problem(inputs=0, parameters=[BIAS], response=fading)
+    found = margin(problem, "G[0,10] (x <= {limit})", (-3, 3), engine="corners", budget=60)
+    assert found.falsified_at is not None and 0.98 < found.falsified_at < 1.0
+    assert found.unfalsified_at is not None and found.unfalsified_at > 1.0, "1.0 is reached by the first one"
+
+
+def test_a_search_whose_few_simulations_fail_is_one_in_vain_if_most_of_all_do_not() -> None:
+    def some(times: Any, inputs: Any, parameters: dict[str, float]) -> dict[str, Any]:
+        lost = 1000 * parameters["bias"] % 1 < 0.4
+        return {"x": np.full(times.shape, np.nan if lost else parameters["bias"])}
+
+    problem = lag_problem(inputs=0, parameters=[BIAS], response=some)
+    found = margin(problem, "G[0,10] (x <= {limit})", (-3, 3), engine="uniform", budget=20)
+    assert found.falsified_at is not None and found.simulations == 20
+
+
+def test_whoever_stops_it_again_gets_what_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("falsifier.analyses.margin.confirm", stop)
+    found = margin(lag_problem(), "G[0,10] (x <= {limit})", (0.0, 3.0), engine="corners", budget=60)
+    assert found.interrupted and found.text.endswith("stopped by the user")

@@ -11,7 +11,7 @@ from falsifier.campaigns import CampaignRequest, cross
 from falsifier.campaigns.analysis import Run, load
 from falsifier.evaluation.workers import LastingExecutor
 from falsifier.problem.problem import Problem
-from falsifier.problem.source import ProblemSource
+from falsifier.problem.source import STL_NAME, ProblemSource
 from falsifier.record.manifest import describe, write
 from falsifier.search.budget import Budget
 from falsifier.search.request import RunRequest
@@ -45,7 +45,12 @@ def work_in_threads(patch: pytest.MonkeyPatch) -> None:
 
     @contextmanager
     def pool(jobs: int) -> Iterator[list[LastingExecutor]]:
-        yield [LastingExecutor(lambda: ThreadPoolExecutor(1)) for _ in range(jobs)]
+        workers = [LastingExecutor(lambda: ThreadPoolExecutor(1)) for _ in range(jobs)]
+        try:
+            yield workers
+        finally:
+            for worker in workers:
+                worker.shutdown()
 
     patch.setattr("falsifier.campaigns.runner.open_workers", pool)
 
@@ -67,10 +72,13 @@ def _outcome(run: Run) -> tuple[object, ...]:
     )
 
 
-def record_ad_hoc(folder: Path, formulas: Mapping[str, str]) -> None:
-    """Begin a run per formula without a name, each in the directory that it is given by."""
+def record_ad_hoc(folder: Path, formulas: Mapping[str, str], named: Mapping[str, str] | None = None) -> None:
+    """Begin a run per formula, each in the directory that it is given by; most without a name."""
     for place, formula in formulas.items():
-        problem = Problem.from_fmu(fixture("CheapLag_2"), formula, inputs={"u": (-1, 1, 3)}, stop_time=1.0)
+        name = (named or {}).get(place, STL_NAME)
+        problem = Problem.from_fmu(
+            fixture("CheapLag_2"), formula, name=name, inputs={"u": (-1, 1, 3)}, stop_time=1.0
+        )
         asked = RunRequest(problems=(problem.source,) if problem.source else ())
         (folder / place).mkdir()
         write(folder / place, describe(asked, [problem], "uniform"))

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from falsifier.campaigns import CampaignRequest, Follower, cross, resume_campaign, run_campaign
+from falsifier.campaigns import CampaignRequest, Follower, Progress, cross, resume_campaign, run_campaign
 from falsifier.campaigns.analysis import load as load_runs
 from falsifier.campaigns.directory import campaign_lock
 from falsifier.counterexamples.case import counterexample_case
@@ -15,6 +15,7 @@ from falsifier.problem.source import ProblemSource
 from falsifier.record.records import Record, parse_line
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
+from falsifier.views.campaign_progress import Scoreboard
 from tests import problems
 from tests.campaigns.support import outcomes, request, work_in_threads
 
@@ -69,6 +70,7 @@ def test_limits_of_the_whole_campaign_stop_it_where_it_is(tmp_path: Path) -> Non
     assert stopped.reason == "the budget of 100 simulations is used up"
     assert 0 < stopped.progress.spent.simulations < 8000
     assert stopped.progress.counts == {"interrupted": 1, "waiting": 3}
+    assert {run.reason for run in stopped.progress.runs} == {stopped.reason, ""}
     assert not (directory / "stop").exists()
     with pytest.raises(SpecError, match="limits: tokens and cost limit language models, and none is named"):
         resume_campaign(directory, limits=Budget(cost=1.0))
@@ -120,6 +122,46 @@ def test_another_worker_error_is_a_failed_run_in_its_journal(
     monkeypatch.undo()
     (run,) = Follower(directory).look().runs
     assert (run.status, run.reason) == ("failed", "RuntimeError: no memory")
+
+
+def test_a_stopped_run_that_cannot_be_continued_has_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object, **__: object) -> None:
+        raise RuntimeError("no memory")
+
+    run_campaign(request("impossible", seeds=1, budget=2000, limits=Budget(10)), tmp_path)
+    monkeypatch.setattr("falsifier.campaigns.schedule.carry_out", broken)
+    told: list[str] = []
+    for _ in range(2):
+        end = resume_campaign(tmp_path, limits=Budget(10_000), listeners=[Scoreboard(told.append)])
+        (run,) = end.progress.runs
+        assert (run.status, run.reason) == ("failed", "RuntimeError: no memory")
+    assert len([line for line in told if line.endswith("no memory")]) == 1
+    (journal,) = tmp_path.rglob("journal.jsonl")
+    assert journal.read_bytes().count(b"no memory") == 1
+
+
+def test_an_error_of_a_listener_ends_the_runs_too(tmp_path: Path) -> None:
+    def full(progress: Progress) -> None:
+        if progress.spent.simulations:
+            raise OSError("disk full")
+
+    with pytest.raises(OSError, match="disk full"):
+        run_campaign(request("impossible", budget=5000), tmp_path, listeners=[full])
+    first, second = Follower(tmp_path).look().runs
+    assert (first.status, first.reason) == ("interrupted", "OSError: disk full")
+    assert second.status == "waiting"
+    assert not (tmp_path / "stop").exists()
+
+
+def test_a_campaign_with_a_run_that_was_stopped_alone_has_not_ended(tmp_path: Path) -> None:
+    def stop_first(progress: Progress) -> None:
+        if progress.runs[0].spent.simulations and not progress.runs[1].spent.simulations:
+            (tmp_path / "runs" / progress.runs[0].name / "stop").touch()
+
+    end = run_campaign(request("impossible", budget=2000), tmp_path, listeners=[stop_first])
+    assert (end.reason, end.progress.finished) == ("1 run stopped alone", 1)
 
 
 @pytest.fixture

@@ -40,3 +40,9 @@ def test_runs_of_formulas_without_a_name_are_told_apart(tmp_path: Path) -> None:
     assert [run.requirement for run in runs] == ["stl-1", "stl-2", "stl-1"]
     assert all(run.is_ad_hoc for run in runs)
     assert [run.requirement for run in load(tmp_path / "b")] == ["stl"]
+
+
+def test_no_number_makes_the_name_of_another_requirement(tmp_path: Path) -> None:
+    formulas = {"a": "G (y <= 5)", "b": "G (y <= 6)", "c": "G (y <= 7)"}
+    record_ad_hoc(tmp_path, formulas, named={"c": "stl-1"})
+    assert [run.requirement for run in load(tmp_path)] == ["stl-2", "stl-3", "stl-1"]

@@ -48,13 +48,13 @@ def test_a_growing_journal_is_counted_line_by_line() -> None:
     assert status(summary) == "running"
     for i, robustness in enumerate([2.0, None, 1.0, 1.0, -3.0]):
         summary.add(evaluated(i, robustness))
-    assert (summary.best, summary.best_robustness) == (4, -3.0)
+    assert (summary.best, summary.best_robustness) == (4, 1.0), "a violation is none before it is confirmed"
     spent = summary.spent
     assert (spent.simulations, spent.simulation_seconds, spent.seconds) == (5, 2.5, 5.0)
     summary.add(confirmed(2, "fragile", "vanishes", Spent()))
     assert status(summary) == "running"
     summary.add(confirmed(4, "confirmed", "yes", Spent(simulations=5, seconds=9.0, cost=None)))
-    assert summary.counterexample == 4
+    assert (summary.counterexample, summary.best_robustness) == (4, -3.0)
     assert summary.unconfirmed == {2: "fragile: vanishes"}
     assert (summary.status, summary.spent.seconds, summary.spent.cost) == ("falsified", 9.0, None)
 
@@ -69,6 +69,14 @@ def test_what_a_search_could_not_show_before_it_was_resumed_is_forgotten() -> No
     for later in (asked(1, 1), evaluated(1, -3.0), confirmed(1, "confirmed", "yes", Spent())):
         summary.add(later)
     assert (status(summary), list(summary.findings)) == ("falsified", [])
+
+
+def test_a_violation_that_was_refuted_is_not_the_best_robustness() -> None:
+    summary = Summary()
+    for index, outcome in enumerate(("refuted", "confirmed")):
+        summary.add(evaluated(index, index - 5.0))
+        summary.add(confirmed(index, outcome, "", Spent()))  # type: ignore[arg-type]
+        assert (summary.best, summary.best_robustness) == (0, (None, -4.0)[index])
 
 
 def test_tokens_and_money_of_a_running_run_come_from_its_exchanges() -> None:

@@ -14,6 +14,7 @@ def run(name: str, seed: int, status: str, simulations: int = 0, best: float | N
         request=RunRequest(problems=()),
         status=status,  # type: ignore[arg-type]
         best=None if best is None else 0,
+        counterexample=0 if status == "falsified" else None,
         _robustness=[] if best is None else [best],
         spent=spent,
     )

@@ -166,7 +166,7 @@ def test_a_stop_needs_the_pages_token_and_ends_a_run_that_can_be_resumed(tmp_pat
 
     problem = lag_problem("G[0,10] (x <= 2)", name="LONG")
     result = falsify(problem, "uniform", budget=100_000, directory=tmp_path / "run", listeners=[press])
-    assert (result.status, result.reason) == ("interrupted", "stopped by the user")
+    assert (result.status, result.reason) == ("interrupted", "stopped on the watch page")
     assert "<button" not in watch(tmp_path / "run", token="t").look()[0], "nothing is left to stop"
     (again,) = resume(tmp_path / "run", problems=[problem], budget=len(steps) + 1)
     assert again.status == "not falsified"
