@@ -3,6 +3,7 @@ import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -81,6 +82,26 @@ def test_names_and_texts_with_any_characters_give_valid_toml(tmp_path: Path) -> 
     offered = [line.removeprefix("# ") for line in spec.read_text("utf-8").splitlines() if "LOW" in line]
     keys = [next(iter(tomllib.loads(line.replace("[LOW, HIGH]", "[1, 2]")))) for line in offered]
     assert keys == ["'T of # plant'", "Verstärkung", "plant\\x"], "parameters, and then initial states"
+
+
+@pytest.mark.parametrize(
+    ("stated", "ends"),
+    [
+        ({"start": -5.0, "low": 0.0}, [0.0, 2.5]),
+        ({"start": 5.0, "high": 1.0}, [-1.5, 1.0]),
+        ({"start": 0.0, "kind": "integer", "type": "UInt8"}, [0, 1]),
+    ],
+)
+def test_a_parameter_to_search_has_a_range_whatever_its_start(
+    stated: dict[str, Any], ends: list[float]
+) -> None:
+    kept = Variable("kept", "enumeration", "parameter", start=1.0, settable=True, literals={"only": 1})
+    known = Variable("u", causality="input", low=1.0, high=1.0), Variable("y", causality="output")
+    searched = Variable("p", causality="parameter", settable=True, **stated)
+    text = starter_spec(Path("m.fmu"), ModelInfo("m", variables=(kept, searched, *known)))
+    assert tomllib.loads(text)["parameters"] == {"p": {"range": ends}}
+    with pytest.raises(SpecError, match="nothing to search"):
+        starter_spec(Path("m.fmu"), ModelInfo("m", variables=(kept, *known)))
 
 
 def test_parameters_beyond_the_first_ten_are_counted() -> None:
