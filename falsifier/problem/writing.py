@@ -231,7 +231,8 @@ class Subject:
         """
         problem, experiment = self.problem, self.problem.experiment
         if self.free_grid:
-            steps = {"fmu_step": experiment.output_interval, "internal_step": problem.info.internal_step}
+            steps = {"internal_step": problem.info.internal_step, "step_size": experiment.step_size}
+            steps["fmu_step"] = experiment.output_interval
             try:
                 fits = fitting_interval(parse(text), experiment.stop_time, **steps)
             except FormulaError as error:

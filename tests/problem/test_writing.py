@@ -239,6 +239,9 @@ def test_the_grid_follows_the_formula_unless_it_is_stated(folder: Path) -> None:
         fixed.parsed("G[0,0.125] (speed <= 1)")
     with pytest.raises(SpecError, match="position"):
         subject.parsed("G[0,1] (speed <=")
+    stepped = GOOD.replace("[inputs.throttle]", "step_size = 0.04\n[inputs.throttle]", 1)
+    with pytest.raises(SpecError, match=r"0\.06 s of the window .* nearest multiple is 0\.08 s$"):
+        subject_of(spec(folder, stepped)).parsed("G[0,0.06] (speed <= 1)")
 
 
 def test_what_a_requirement_changes_does_not_hold_for_a_new_one(folder: Path) -> None:
