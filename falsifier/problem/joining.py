@@ -185,8 +185,7 @@ def join_formula(
         raise SpecError(f"{path}: the {info.noun} has no default stop time; add {stop_time}")
     spec = parse_spec(data | {"requirements": {STL_NAME: stated}}, file=str(path))
     if all(section.value is not None for _, section in changes.variables):
-        connected = {target for _, target in info.connections}
-        bounded = {v.name: InputSection() for v in info.inputs if v.is_bounded and v.name not in connected}
+        bounded = {v.name: InputSection() for v in info.inputs if v.is_bounded}
         changes = changes.model_copy(update={"inputs": bounded | changes.inputs})
     return join(
         spec,
@@ -328,16 +327,14 @@ def _nothing_to_search(info: ModelInfo, changes: ModelChanges, inputs: Collectio
     ``inputs`` are those with a section, in which all of them have values.
     """
     kept = [name for name, _ in changes.variables]
-    connected = {target for _, target in info.connections}
-    known = [v for v in info.inputs if v.name not in connected]
-    bounded = [v.name for v in known if v.is_bounded]
-    kind, add = "inputs", searching("inputs", "NAME")
+    bounded = [v.name for v in info.inputs if v.is_bounded]
+    known, kind, add = list(info.inputs), "inputs", searching("inputs", "NAME")
     why, section = "no input has a range", "[inputs.NAME] with range and control_points, or "
     if not known:
         known = [v for v in info.variables if v.settable and v.kind != "string"]
         known.sort(key=lambda v: v.causality != "parameter")
         kind, add = "parameters and start values", searching("parameters", "NAME")
-        why, section = f"the {info.noun} has no input{' that is not connected' if connected else ''}", ""
+        why, section = f"the {info.noun} has no input", ""
     if inputs and not kept:
         why = f"the spec keeps {listed([*inputs])} constant"
     elif kept:
