@@ -221,7 +221,8 @@ class Subject:
     def is_started(self) -> bool:
         """Whether its first requirement is a starter's, still without its number."""
         formula = tomllib.loads(self.text)["requirements"].get(_STARTED, {}).get("formula")
-        return isinstance(formula, str) and formula.endswith(f"<= {PLACEHOLDER})")
+        is_ours = isinstance(formula, str) and formula.endswith(f"<= {PLACEHOLDER})")
+        return is_ours and PLACEHOLDER not in self.problem.info
 
     def parsed(self, text: str) -> tuple[Formula, Problem]:
         """Return a formula that fits, and the problem with the time grid on which it is judged.

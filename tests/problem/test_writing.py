@@ -3,6 +3,7 @@ import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -222,6 +223,8 @@ def test_a_starter_spec_on_disk_gets_the_requirement_in_place_of_its_placeholder
     path.write_text(starter_spec(Path(fmu.name), read_info(fmu)))
     subject = subject_of(str(path))
     assert not subject.is_new
+    own: Any = SimpleNamespace(info=ModelInfo("m", variables=(Variable("LIMIT"),)))
+    assert subject.is_started and not replace(subject, problem=own).is_started, "compared with a variable"
     text, name = with_requirement(subject, path, "G[0,9] (speed <= 3)", description="")
     path.write_text(text)
     assert (name, list(read_spec(path).requirements)) == ("R1", ["R1"])
