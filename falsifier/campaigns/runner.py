@@ -200,7 +200,7 @@ def check_request(request: CampaignRequest) -> dict[ProblemSource, Problem]:
     _check_limits(request)
     problems = _load(runs)
     for run in {repr((r.problems[0], r.engine, r.llm)): r for r in runs}.values():
-        told_problems(run, [problems[run.problems[0]]], {})
+        told_problems(run, [problems[run.problems[0]]])
     return problems
 
 

@@ -118,13 +118,15 @@ def formalize(*, target: str, sentence: str, choose: int | None, out: Path | Non
 
 def _write(found: "Formalized", number: int, out: Path | None) -> tuple[str, str]:
     """Write a reading into the spec; return the file and the requirement's name."""
-    from falsifier.problem.writing import with_requirement
+    from falsifier.problem.writing import subject_of, with_requirement
 
     if number > len(found.readings):
         raise SpecError(f"--choose {number}: expected 1 to {len(found.readings)}, the number of a reading")
     file = _file(found.subject, out)
     formula = str(found.readings[number - 1].formula)
-    text, name = with_requirement(found.subject, file, formula, description=found.sentence)
+    # A spec may have been edited while the language model was asked.
+    subject = found.subject if found.subject.is_new else subject_of(str(found.subject.path))
+    text, name = with_requirement(subject, file, formula, description=found.sentence)
     write_whole(file, text)
     return str(file), name
 

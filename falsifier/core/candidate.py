@@ -38,8 +38,9 @@ class Candidate:
             object.__setattr__(self, what, FixedDict(values))
         for name, signal in self.signals.items():
             instance(f"signals, {name!r}", signal, Signal, "a Signal")
-        for name, value in self.parameters.items():
-            finite(f"parameters, {name!r}", value)
+        # As of signals: JSON has no numbers of numpy.
+        numbers = {n: finite(f"parameters, {n!r}", v) for n, v in self.parameters.items()}
+        object.__setattr__(self, "parameters", FixedDict(numbers))
 
     @property
     def key(self) -> tuple[object, ...]:

@@ -49,9 +49,10 @@ def fit(space: SearchSpace, candidate: Candidate) -> Fitted:
     parameters = {}
     for p in space.parameters:
         value = candidate.parameters.get(p.name, p.nominal)
-        if value is None:
+        is_given = p.name in candidate.parameters
+        if value is None or (not is_given and is_outside(p, value)):
             raise _missing(p)
-        if p.name not in candidate.parameters:
+        if not is_given:
             notes.append(f"{p.name} is not given: its nominal value, {shortest(value)}, is used")
         notes += _rounded(p, (value,))
         parameters[p.name] = value

@@ -84,7 +84,9 @@ def join(
         info = model.info
         layers.append(changes := placed(changes, info))
         # All formulas of a spec, so that its requirements can share a search.
-        sections = spec.requirements.values() if stated is None else [stated]
+        sections = list(spec.requirements.values()) if stated is None else [stated]
+        if any(layer.stop_time for layer in layers[1:]):  # goes before what requirements state
+            sections = [each.model_copy(update={"stop_time": None}) for each in sections]
         formulas_of = partial(section_formulas, sections)
         experiment, grid = _experiment(spec, layers, info, changes, formulas_of)
         if isinstance(model, System):
@@ -101,7 +103,7 @@ def join(
         inputs = {name: s.model_copy(update={"free": free}) if s.is_open else s for name, s in inputs.items()}
         space, fixed = search_space(inputs, parameters, info, experiment.stop_time, changes)
         if searches and not space.names:
-            raise _nothing_to_search(info, changes)
+            raise _nothing_to_search(info, changes, inputs)
         for r in space.inputs:
             check_steps(experiment.stop_time, r.hold, key=f"inputs.{r.name}.hold")
         section, name, key = spec.requirements[requirement], requirement, f"requirements.{requirement}"
@@ -183,8 +185,7 @@ def join_formula(
         raise SpecError(f"{path}: the {info.noun} has no default stop time; add {stop_time}")
     spec = parse_spec(data | {"requirements": {STL_NAME: stated}}, file=str(path))
     if all(section.value is not None for _, section in changes.variables):
-        connected = {target for _, target in info.connections}
-        bounded = {v.name: InputSection() for v in info.inputs if v.is_bounded and v.name not in connected}
+        bounded = {v.name: InputSection() for v in info.inputs if v.is_bounded}
         changes = changes.model_copy(update={"inputs": bounded | changes.inputs})
     return join(
         spec,
@@ -320,8 +321,11 @@ def _recording(
     return replace(experiment, outputs=tuple(outputs), internals=tuple(internals))
 
 
-def _nothing_to_search(info: ModelInfo, changes: ModelChanges) -> SpecError:
-    """Return the error that says what keeps everything constant, and what lets something vary."""
+def _nothing_to_search(info: ModelInfo, changes: ModelChanges, inputs: Collection[str]) -> SpecError:
+    """Return the error that says what keeps everything constant, and what lets something vary.
+
+    ``inputs`` are those with a section, in which all of them have values.
+    """
     kept = [name for name, _ in changes.variables]
     bounded = [v.name for v in info.inputs if v.is_bounded]
     known, kind, add = list(info.inputs), "inputs", searching("inputs", "NAME")
@@ -331,7 +335,9 @@ def _nothing_to_search(info: ModelInfo, changes: ModelChanges) -> SpecError:
         known.sort(key=lambda v: v.causality != "parameter")
         kind, add = "parameters and start values", searching("parameters", "NAME")
         why, section = f"the {info.noun} has no input", ""
-    if kept:
+    if inputs and not kept:
+        why = f"the spec keeps {listed([*inputs])} constant"
+    elif kept:
         why = f"{written('--set keeps', 'a value keeps')} {listed(kept)} constant"
     elif bounded:
         why = f"{listed(bounded)} would be searched between min and max if a section [inputs.NAME] named them"

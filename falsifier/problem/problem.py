@@ -199,8 +199,7 @@ class Problem:
         """The model's inputs and parameters that are not searched, with their values and the reason."""
         given: dict[str, float | str] = {**dict(self.experiment.strings), **self.parameters}
         searched = set(self.space.names)
-        connected = {target for _, target in self.info.connections}
-        listed = [v for v in (*self.info.inputs, *self.info.parameters) if v.name not in connected]
+        listed = [*self.info.inputs, *self.info.parameters]
         names = {v.name for v in listed}
         # Start values and elements that are given belong to variables of other kinds.
         listed += [v for v in self.info.variables if v.name in given and v.name not in names]

@@ -86,8 +86,8 @@ def parse_requirement(text: str, info: ModelInfo, experiment: Experiment) -> For
     try:
         Monitor(formula, step=experiment.output_interval, samples=experiment.samples)
     except FormulaError as error:
-        steps = {"fmu_step": experiment.output_interval, "internal_step": info.internal_step}
-        fits = fitting_interval(formula, experiment.stop_time, **steps)
+        steps = {"internal_step": info.internal_step, "step_size": experiment.step_size}
+        fits = fitting_interval(formula, experiment.stop_time, fmu_step=experiment.output_interval, **steps)
         is_other = fits is not None and fits != experiment.output_interval
         advice = f"; {setting('output_interval', f'{fits:.12g}')} fits all times" if is_other else ""
         raise SpecError(f"{error}{advice}") from None

@@ -55,12 +55,15 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
     """
     inputs = [v for v in info.inputs if v.kind != "string"]
     settable = [v for v in info.variables if v.settable and v.kind != "string" and v.causality != "input"]
+    settable = [v for v in settable if _varies(v)]
     # Parameters and initial states, or else all start values; real ones first.
     tunable = [v for v in settable if v.causality == "parameter" or v.is_state] or settable
     tunable.sort(key=lambda v: (v.causality != "parameter", v.kind != "real"))
-    if not inputs and not tunable:
+    has_input = any(map(_varies, inputs))
+    if not has_input and not tunable:
         raise SpecError(
-            f"{info.name}: nothing to search: the {info.noun} has no input, parameter or start value to set"
+            f"{info.name}: nothing to search: the {info.noun} has no input, parameter or start value to set "
+            "to more than one value"
         )
     sections = [_comment(f"{info.name}: {info.description}" if info.description else info.name)]
     model = ["[model]"]
@@ -75,7 +78,7 @@ def starter_spec(fmu: Path | Mapping[str, Path], info: ModelInfo) -> str:
     model += ["# output_interval = SECONDS  # default: fits the FMU's step, the formulas and the stop time"]
     sections += ["\n".join(model), *map(_input, inputs)]
     if tunable:
-        sections.append(_parameters(tunable, searched=() if inputs else tunable[:1]))
+        sections.append(_parameters(tunable, searched=() if has_input else tunable[:1]))
     sections.append(_requirement(info, stop_time))
     return "\n\n".join(sections) + "\n"
 
@@ -129,13 +132,23 @@ def _input(v: Variable) -> str:
     return "\n".join([*lines, _comment(points)])
 
 
+def _varies(v: Variable) -> bool:
+    """Whether a variable may have more than one value."""
+    low, high = v.limits
+    return low is None or high is None or low < high
+
+
 def _parameters(tunable: Sequence[Variable], *, searched: Sequence[Variable]) -> str:
     lines = ["[parameters]"]
     for v in searched:
         start = v.start_number or 0.0
         reach = max(abs(start), 1.0) / 2
         low, high = v.limits
-        limits = _range(v, start - reach if low is None else low, start + reach if high is None else high)
+        # The start value may be outside of what the FMU states.
+        low = (start if high is None else min(start, high)) - reach if low is None else low
+        high = max(start, low) + reach if high is None else high
+        least, most = v.type_limits or (low, high)
+        limits = _range(v, max(low, least), min(high, most))
         lines.append(_noted(f"{toml_key(v.name)}.range = {limits}", "replace with the real range"))
     others = [v for v in tunable if v not in searched]
     if others:
@@ -208,7 +221,8 @@ class Subject:
     def is_started(self) -> bool:
         """Whether its first requirement is a starter's, still without its number."""
         formula = tomllib.loads(self.text)["requirements"].get(_STARTED, {}).get("formula")
-        return isinstance(formula, str) and formula.endswith(f"<= {PLACEHOLDER})")
+        is_ours = isinstance(formula, str) and formula.endswith(f"<= {PLACEHOLDER})")
+        return is_ours and PLACEHOLDER not in self.problem.info
 
     def parsed(self, text: str) -> tuple[Formula, Problem]:
         """Return a formula that fits, and the problem with the time grid on which it is judged.
@@ -218,7 +232,8 @@ class Subject:
         """
         problem, experiment = self.problem, self.problem.experiment
         if self.free_grid:
-            steps = {"fmu_step": experiment.output_interval, "internal_step": problem.info.internal_step}
+            steps = {"internal_step": problem.info.internal_step, "step_size": experiment.step_size}
+            steps["fmu_step"] = experiment.output_interval
             try:
                 fits = fitting_interval(parse(text), experiment.stop_time, **steps)
             except FormulaError as error:

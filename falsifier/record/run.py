@@ -300,7 +300,7 @@ def carry_out(
             check(directory)
         # Before anything is written, so that a wrong engine or a missing key leaves no directory behind.
         recorded = manifest.read(directory) if begun and directory else None
-        told = told_problems(request, problems, recorded.contexts if recorded else {})
+        told = told_problems(request, problems, recorded.contexts if recorded else None)
         for problem in problems:
             stack.callback(problem.model.close)
         internals = recorded.internals if recorded else ()

@@ -66,24 +66,26 @@ def make_engines(
 
 
 def told_problems(
-    request: RunRequest, problems: Sequence[Problem], recorded: Mapping[str, Context]
+    request: RunRequest, problems: Sequence[Problem], recorded: Mapping[str, Context] | None = None
 ) -> list[Problem]:
     """Return the problems with what their context files say to the language model or engine that leads.
 
-    Files of recorded contexts, which are given by requirement, are not read again.
+    Of a run that is continued, ``recorded`` are its contexts by requirement, and no file is read again: one
+    without a context there had none, even if its files are gone or others by now.
 
     Raises:
         SpecError: if a file cannot be read, looks like it holds a secret, or must not be told.
     """
     llm = request.llm
-    known = [replace(p, context=recorded[p.name]) if p.name in recorded else p for p in problems]
+    if recorded is not None:
+        return [replace(p, context=recorded.get(p.name, Context())) for p in problems]
     if llm is None:
         engine = ENGINES.get(request.engine or DEFAULT_ENGINE)
         is_read = engine is not None and engine.uses_context
-        return [with_context(p, is_told=False) if is_read else p for p in known]
+        return [with_context(p, is_told=False) if is_read else p for p in problems]
     from falsifier.engines.briefing import told_context
 
-    return [told_context(problem, llm.variant, anonymous=llm.anonymous)[0] for problem in known]
+    return [told_context(problem, llm.variant, anonymous=llm.anonymous)[0] for problem in problems]
 
 
 def check_names(engine: str | None, llm: LLMSettings | None) -> None:

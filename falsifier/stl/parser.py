@@ -32,6 +32,8 @@ from falsifier.stl import expression, formula as stl, lexer
 MAX_DEPTH = 100
 # Maximum number of characters of a formula.
 MAX_LENGTH = 20_000
+# Maximum bound of a window in s: in samples, and added up over all levels, it is still a number.
+_MAX_BOUND = 1e100
 # Bounds in different units that differ relatively by less, in the wrong order, are equal but for rounding.
 _ROUNDED = 1e-5
 
@@ -260,7 +262,7 @@ class _Parser:
                 bracket.position,
                 f"write the smaller bound first: {stl.Window(window.end, window.start)}",
             )
-        if not math.isfinite(window.end):
+        if window.end > _MAX_BOUND:
             self._fail("the bound is too large", end_token.position, "omit the window")
         return window
 

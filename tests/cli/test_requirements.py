@@ -1,8 +1,15 @@
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+from falsifier.analyses.formalize import Formalized
+from falsifier.cli.requirements import _write
 from falsifier.problem.loading import load_problem
+from falsifier.problem.spec import read_spec
+from falsifier.problem.writing import subject_of
+from falsifier.search.budget import Spent
 from tests.analyses.test_lint import SPEC
 from tests.cli.support import ENV
 from tests.command import falsifier
@@ -81,6 +88,16 @@ def test_a_sentence_becomes_a_requirement_of_the_spec(tmp_path: Path) -> None:
     assert load_problem(str(tmp_path / "other" / "new.toml:R2")).model.path.is_file()  # type: ignore[attr-defined]
     problem = load_problem(str(tmp_path / "my.toml:R1"))
     assert (str(problem.requirement.formula), problem.requirement.description) == (GOOD["formula"], SENTENCE)
+
+
+def test_what_is_edited_while_the_model_is_asked_is_kept(tmp_path: Path) -> None:
+    path = Path(spec(tmp_path, WIDE))
+    subject = subject_of(str(path))
+    path.write_text(f"# mine\n{WIDE}")
+    reading: Any = SimpleNamespace(formula=GOOD["formula"])
+    found = Formalized(SENTENCE, subject, (reading,), (), (), Spent())
+    assert _write(found, 1, None) == (str(path), "R1")
+    assert path.read_text().startswith("# mine\n") and "R1" in read_spec(path).requirements
 
 
 def test_an_fmu_gets_a_spec(tmp_path: Path) -> None:

@@ -325,9 +325,10 @@ def test_a_missing_parameter_has_its_nominal_value_and_needs_one() -> None:
     assert "x0 is not given: its nominal value, 0, is used" in fitted.notes[0]
     exact = replace(space, parameters=(replace(START, nominal=0.123456789),))
     assert "0.123456789, is used" in fit(exact, Candidate({"u": RAMP})).notes[-1]
-    unknown = replace(space, parameters=(replace(START, nominal=None),))
-    with pytest.raises(CandidateError, match="'x0' is searched and missing"):
-        fit(unknown, Candidate({"u": RAMP}))
+    for nominal in (None, 99.0):  # not known, or outside the range
+        unknown = replace(space, parameters=(replace(START, nominal=nominal),))
+        with pytest.raises(CandidateError, match="'x0' is searched and missing"):
+            fit(unknown, Candidate({"u": RAMP}))
 
 
 def test_values_outside_the_range_and_missing_inputs_are_refused() -> None:

@@ -42,8 +42,9 @@ def test_control_points_are_floats_whatever_numbers_are_given() -> None:
         signal = Signal(times, (1,) * len(times), "constant")
         assert signal.sample(np.array([0.0, 1.0])).dtype == np.float64
     values: Any = (np.float32(0.5),)
-    written = Candidate({"u": Signal((0.0,), values)}).to_json()
-    assert json.loads(json.dumps(written))["signals"]["u"]["values"] == [0.5]
+    parameters: Any = {"count": np.int64(3)}
+    written = json.loads(json.dumps(Candidate({"u": Signal((0.0,), values)}, parameters).to_json()))
+    assert (written["signals"]["u"]["values"], written["parameters"]) == ([0.5], {"count": 3.0})
 
 
 def test_an_empty_text_is_no_path() -> None:

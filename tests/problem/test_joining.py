@@ -91,6 +91,24 @@ def test_requirement_then_profile_then_option_override_the_spec() -> None:
     assert changed.experiment.stop_time == 25.0
 
 
+def test_a_stop_time_that_is_overridden_decides_no_grid() -> None:
+    spec = copy.deepcopy(SPEC)
+    spec["requirements"]["S"] = {"template": "stays_within", "signal": "speed", "high": 80}
+    spec["requirements"]["S"]["stop_time"] = 3.14159
+    found = join(parse_spec(spec, file="my.toml"), "S", path=FILE, changes=changes_from(stop_time=7.0))
+    assert (str(found.requirement.formula), found.experiment.output_interval) == (
+        "G[0,7] (speed <= 80)",
+        0.01,
+    )
+
+
+def test_what_keeps_everything_constant_is_said_as_it_is() -> None:
+    spec = copy.deepcopy(SPEC) | {"parameters": {}}
+    spec["inputs"]["throttle"] = {"value": 3}
+    with pytest.raises(SpecError, match="nothing to search: the spec keeps throttle and brake constant"):
+        join(parse_spec(spec, file="my.toml"), "R", path=FILE)
+
+
 def test_a_formula_of_ones_own_takes_the_requirements_place() -> None:
     found = joined(stated=RequirementSection(formula="F[0,20] (rpm > 3000)"))
     assert (found.requirement.name, found.requirement.description) == ("stl", "")

@@ -3,6 +3,8 @@ import sys
 import tomllib
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -81,6 +83,26 @@ def test_names_and_texts_with_any_characters_give_valid_toml(tmp_path: Path) -> 
     offered = [line.removeprefix("# ") for line in spec.read_text("utf-8").splitlines() if "LOW" in line]
     keys = [next(iter(tomllib.loads(line.replace("[LOW, HIGH]", "[1, 2]")))) for line in offered]
     assert keys == ["'T of # plant'", "Verstärkung", "plant\\x"], "parameters, and then initial states"
+
+
+@pytest.mark.parametrize(
+    ("stated", "ends"),
+    [
+        ({"start": -5.0, "low": 0.0}, [0.0, 2.5]),
+        ({"start": 5.0, "high": 1.0}, [-1.5, 1.0]),
+        ({"start": 0.0, "kind": "integer", "type": "UInt8"}, [0, 1]),
+    ],
+)
+def test_a_parameter_to_search_has_a_range_whatever_its_start(
+    stated: dict[str, Any], ends: list[float]
+) -> None:
+    kept = Variable("kept", "enumeration", "parameter", start=1.0, settable=True, literals={"only": 1})
+    known = Variable("u", causality="input", low=1.0, high=1.0), Variable("y", causality="output")
+    searched = Variable("p", causality="parameter", settable=True, **stated)
+    text = starter_spec(Path("m.fmu"), ModelInfo("m", variables=(kept, searched, *known)))
+    assert tomllib.loads(text)["parameters"] == {"p": {"range": ends}}
+    with pytest.raises(SpecError, match="nothing to search"):
+        starter_spec(Path("m.fmu"), ModelInfo("m", variables=(kept, *known)))
 
 
 def test_parameters_beyond_the_first_ten_are_counted() -> None:
@@ -201,6 +223,8 @@ def test_a_starter_spec_on_disk_gets_the_requirement_in_place_of_its_placeholder
     path.write_text(starter_spec(Path(fmu.name), read_info(fmu)))
     subject = subject_of(str(path))
     assert not subject.is_new
+    own: Any = SimpleNamespace(info=ModelInfo("m", variables=(Variable("LIMIT"),)))
+    assert subject.is_started and not replace(subject, problem=own).is_started, "compared with a variable"
     text, name = with_requirement(subject, path, "G[0,9] (speed <= 3)", description="")
     path.write_text(text)
     assert (name, list(read_spec(path).requirements)) == ("R1", ["R1"])
@@ -218,6 +242,9 @@ def test_the_grid_follows_the_formula_unless_it_is_stated(folder: Path) -> None:
         fixed.parsed("G[0,0.125] (speed <= 1)")
     with pytest.raises(SpecError, match="position"):
         subject.parsed("G[0,1] (speed <=")
+    stepped = GOOD.replace("[inputs.throttle]", "step_size = 0.04\n[inputs.throttle]", 1)
+    with pytest.raises(SpecError, match=r"0\.06 s of the window .* nearest multiple is 0\.08 s$"):
+        subject_of(spec(folder, stepped)).parsed("G[0,0.06] (speed <= 1)")
 
 
 def test_what_a_requirement_changes_does_not_hold_for_a_new_one(folder: Path) -> None:

@@ -57,6 +57,14 @@ def test_a_resumed_run_needs_no_file(file: Path, tmp_path: Path) -> None:
     assert (result.status, result.spent.simulations) == ("falsified", 2)
 
 
+def test_a_resumed_run_reads_no_file_that_told_it_nothing(tmp_path: Path) -> None:
+    file, place = tmp_path / "notes.c", tmp_path / "run"
+    file.write_text("int f(void) { return 0; }\n")
+    falsify(with_file(file), "surrogate", budget=1, directory=place)
+    file.unlink()
+    assert resume(place, budget=2)[0].spent.simulations == 2
+
+
 def test_nothing_is_asked_or_recorded_if_a_file_looks_like_a_secret(tmp_path: Path) -> None:
     path, place = tmp_path / "notes.md", tmp_path / "run"
     path.write_text("password = hunter22\n")

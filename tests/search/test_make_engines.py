@@ -93,11 +93,12 @@ def test_the_surrogate_alone_reads_levels_and_what_is_recorded_is_not_read_again
         "// password: not so secret, and sent nowhere\n"
     )
     problem = replace(PROBLEM, named_context=Named((str(source),)))
-    (read,) = told_problems(request(), [problem], {})
+    (read,) = told_problems(request(), [problem])
     assert read.context == Context(crossings=(Crossing(PROBLEM.space.inputs[0].name, 0.25),))
     source.unlink()
-    assert told_problems(request("cma"), [problem], {})[0].context == Context()
+    assert told_problems(request("cma"), [problem])[0].context == Context()
     (recorded,) = told_problems(request(), [problem], {problem.name: read.context})
     assert recorded.context == read.context
+    assert told_problems(request(), [problem], {})[0].context == Context()  # it told nothing
     with pytest.raises(SpecError, match="cannot be read"):
-        told_problems(request(), [problem], {})
+        told_problems(request(), [problem])

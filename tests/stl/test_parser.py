@@ -178,6 +178,7 @@ MISTAKES = [
     ("b and alw_[1.5 s : 2 s] (x <= 3)", 18, "with a comma: [a,b]"),
     ("b and x[2:3] <= 3", 10, "no meaning"),
     ("G[0,1e400] b", 5, "omit the window"),
+    ("G[0,1e308] b", 5, "omit the window"),  # finite, but not in samples
     ("G[0,5]", 7, "ends too early"),
     ("(x <= 3", 8, "position 1"),
     ("x <= 3)", 7, "one ')' too many"),
