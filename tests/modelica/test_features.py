@@ -99,6 +99,15 @@ def test_a_result_of_another_size_stops_the_simulation(build: Build) -> None:
     assert "different sizes" in said_on_failure(build("Corners"), ("x",), m=5)
 
 
+def test_a_time_event_is_found_though_times_are_added_up(build: Build) -> None:
+    with opened(build("Corners")) as [fmu]:
+        fmu.start()
+        for _ in range(8):
+            fmu.step(0.1)
+        assert fmu.time < 0.8
+        assert fmu.get("passed") == 1
+
+
 def test_arrays_and_arrays_of_components(build: Build) -> None:
     names = ["v[1]", "v[2]", "v[3]", "last", "both", "total", "slow"]
     c, tanks = math.cos(1), [k * (1 - math.exp(-1 / T)) for k, T in ((1, 1), (2, 2), (3, 4))]

@@ -108,7 +108,7 @@ class Printer:
         if node in self.layout.time_relations:
             late = isinstance(node.left, Time)
             threshold = right if late else left
-            return f"({'' if _time_after(node) else '!'}(m->time >= {threshold}))"
+            return f"({'' if _time_after(node) else '!'}time_reached(m, {threshold}))"
         return f"({left} {node.name} {right})"
 
     def operation(self, node: Op) -> str:

@@ -44,6 +44,8 @@ model Corners "Empty ranges, results assigned to arguments, defaults, values bef
 
   parameter Integer n = 1;
   parameter Integer m = 2;
+  parameter Real late(unit = "s") = 0.8;
+  output Integer passed(start = 0);
   output Integer loops;
   output Real own[2];
   output Real value = composed(1);
@@ -58,6 +60,9 @@ equation
   end when;
   when sample(0, 0.2) then
     atTick = pre(y);
+  end when;
+  when time >= late then
+    passed = pre(passed) + 1;
   end when;
 algorithm
   loops := size(own[2:1], 1);
