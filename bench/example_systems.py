@@ -7,12 +7,12 @@ The figure after the @ is the number of runs with a violation. Committed table: 
 import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from statistics import mean, stdev
+from statistics import mean
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bench.search import seeds_from
+from bench.search import seeds_from, with_error
 from falsifier import ENGINES as ALL_ENGINES, falsify
 from falsifier.core.experiment import Experiment
 from falsifier.core.function_model import FunctionModel
@@ -168,8 +168,7 @@ def compare(problems: Mapping[str, Callable[[], Problem]], description: str | No
                 result = falsify(problem, engine, seed=seed, budget=options.budget)
                 counts.append(result.spent.simulations if result.falsified else options.budget)
                 found += result.falsified
-            error = f" ± {stdev(counts) / len(counts) ** 0.5:.1f}" if len(counts) > 1 else ""
-            cells.append(f"{mean(counts):.1f}{error} @ {found}")
+            cells.append(f"{with_error(counts)} @ {found}")
             means[engine].append(mean(counts))
         print(f"| {' | '.join(cells)} |", flush=True)
     print(f"| {' | '.join(['mean', *(f'{mean(row):.1f}' for row in means.values())])} |")

@@ -192,8 +192,8 @@ def report(rounds: int) -> str:
         "",
         f"`python -m bench.fmu_overhead --rounds {rounds}`; {platform.machine()}, {os.cpu_count()} cores, "
         f"load {load:.1f} before the start, Python {platform.python_version()}. Times in microseconds: "
-        "minimum (median) of interleaved rounds; ratios of minima (median of the ratios; for fmpy, ratio of "
-        "medians).",
+        "minimum (median) of interleaved rounds; ratio of minima (of medians); difference of minima (median "
+        "of the differences).",
         "",
         "| FMU, steps | C program | in a worker | fmpy.simulate_fmu | fmpy / worker | worker - C |",
         "|---|---|---|---|---|---|",

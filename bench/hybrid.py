@@ -24,7 +24,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from math import inf
-from statistics import mean, stdev
+from statistics import mean
 
 # For the engines' small matrices, threads of the linear algebra cost more than they save.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -32,7 +32,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from bench.search import seeds_from
+from bench.search import seeds_from, with_error
 from falsifier import Candidate, Problem, Signal, falsify, load_problem
 from falsifier.core.ranges import InputRange
 from falsifier.engines.hybrid import Hybrid
@@ -144,11 +144,6 @@ def led(problem: Problem, one: StandIn, budget: int) -> int:
     return simulations(problem, engine, budget, one.see)
 
 
-def estimate(values: Sequence[float]) -> str:
-    """Return mean and standard error."""
-    return f"{mean(values):.2f} ± {stdev(values) / len(values) ** 0.5:.2f}"
-
-
 def rows(name: str, seeds: range, budget: int, kinds: Sequence[str]) -> None:
     """Print the rows of one requirement."""
     problem = load_problem(name)
@@ -159,7 +154,7 @@ def rows(name: str, seeds: range, budget: int, kinds: Sequence[str]) -> None:
         llm = ALONE.get(kind, inf)
         better = [int(llm)] * len(alone) if mean(alone) > llm else alone
         more = [b - a for b, a in zip(both, better, strict=True)]
-        cells = (name, kind, estimate(alone), estimate(both), estimate(more))
+        cells = (name, kind, *(with_error(values, 2) for values in (alone, both, more)))
         print(f"| {' | '.join(cells)} |", flush=True)
 
 

@@ -20,7 +20,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import mean, stdev
+from statistics import mean
 
 # For the engines' small matrices, threads of the linear algebra cost more than they save.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -28,6 +28,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
+from bench.search import with_error
 from falsifier import Problem, load_problem
 from falsifier.engines import make_engine
 from falsifier.evaluation.evaluate import Evaluation, evaluate
@@ -106,8 +107,11 @@ def peer_search(
             if _violates(evaluation):
                 peer.kill()
                 return Search(count, time.perf_counter() - started, simulating, evaluation)
-            print(evaluation.robustness, file=peer.stdin, flush=True)
+            cost = float("inf") if evaluation.robustness is None else evaluation.robustness
+            print(cost, file=peer.stdin, flush=True)
             line = peer.stdout.readline()
+        if not line and peer.wait():
+            raise SystemExit(f"psy-taliro failed after {count} simulations, so this search says nothing")
         peer.kill()
     return Search(budget, time.perf_counter() - started, simulating)
 
@@ -119,13 +123,12 @@ def _violates(evaluation: Evaluation) -> bool:
 def row(requirement: str, method: str, searches: Sequence[Search]) -> str:
     """Return one row of the table."""
     counts = [s.simulations for s in searches]
-    error = stdev(counts) / len(counts) ** 0.5 if len(counts) > 1 else float("nan")
     overhead = [(s.seconds - s.simulating) / s.simulations for s in searches]
     cells = (
         requirement,
         method,
         f"{sum(s.falsified for s in searches)}/{len(searches)}",
-        f"{mean(counts):.1f} ± {error:.1f}",
+        with_error(counts),
         f"{mean(s.seconds for s in searches):.2f}",
         f"{1e3 * mean(overhead):.1f}",
     )

@@ -54,7 +54,7 @@ def row(requirement: str, results: Sequence[Result], published: dict[str, Any]) 
         _published(published["best"].get(requirement)),
         _published(published["uniform"].get(requirement)),
         f"{len(counts)}/{len(results)}",
-        _with_error(counts),
+        with_error(counts),
         f"{median(counts):g}" if counts else "–",
         str(max(counts)) if counts else "–",
         f"{median(dwells):.2g}" if dwells else "–",
@@ -65,11 +65,12 @@ def row(requirement: str, results: Sequence[Result], published: dict[str, Any]) 
     return f"| {' | '.join(cells)} |"
 
 
-def _with_error(counts: Sequence[int]) -> str:
-    """Mean with its standard error."""
-    if len(counts) < 2:
-        return str(counts[0]) if counts else "–"
-    return f"{mean(counts):.1f} ± {stdev(counts) / len(counts) ** 0.5:.1f}"
+def with_error(values: Sequence[float], digits: int = 1) -> str:
+    """Return the mean with its standard error, which a single value does not have."""
+    if not values:
+        return "–"
+    error = f" ± {stdev(values) / len(values) ** 0.5:.{digits}f}" if len(values) > 1 else ""
+    return f"{mean(values):.{digits}f}{error}"
 
 
 def _published(entry: dict[str, Any] | None) -> str:

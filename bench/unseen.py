@@ -2,8 +2,9 @@
 
 Searches for every requirement of the spec files in a folder with every engine. A cell is the mean number of
 simulations until a confirmed violation, a miss counted as the budget, with its standard error; how many runs
-found one; and the seconds of thinking per proposal. The last row is the mean over the requirements. The
-parameterization is fixed, because most engines search no other; with ``--free``, it is free.
+found one; and the seconds of thinking per proposal. Violations that psy-taliro finds are
+not confirmed. The last row is the mean over the requirements. The parameterization is fixed, because most
+engines search no other; with ``--free``, it is free.
 
     python -m bench.unseen bench/development
     python -m bench.unseen bench/development --engines surrogate cma --systems Crane BottleLine --seeds 10-19
@@ -18,10 +19,10 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import mean, stdev
+from statistics import mean
 
 from bench.peers import PEERS, interpreter, peer_search
-from bench.search import seeds_from
+from bench.search import seeds_from, with_error
 from falsifier import ENGINES, Problem, evaluate, falsify, load_problem, make_engine
 from falsifier.evaluation.evaluate import judge
 from falsifier.problem.source import Parameterization
@@ -61,8 +62,7 @@ def peer(problem: Problem, optimizer: str, python: Path, *, seed: int, budget: i
 def cell(runs: Sequence[Run]) -> str:
     """Return what a table says of the runs of one engine on one requirement."""
     counts = [run.simulations for run in runs]
-    error = f" ± {stdev(counts) / len(counts) ** 0.5:.1f}" if len(counts) > 1 else ""
-    return f"{mean(counts):.1f}{error} @ {sum(r.found for r in runs)}, {mean(r.thinking for r in runs):.3f} s"
+    return f"{with_error(counts)} @ {sum(r.found for r in runs)}, {mean(r.thinking for r in runs):.3f} s"
 
 
 def problems_of(folder: Path, systems: Sequence[str], *, free: bool) -> list[dict[str, Problem]]:

@@ -20,13 +20,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from statistics import mean, stdev
+from statistics import mean
 
 # For the engines' small matrices, threads of the linear algebra cost more than they save.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from bench.peers import PEERS, interpreter, peer_search
+from bench.search import with_error
 from falsifier import Budget, Problem, falsify, load_problem
 from falsifier.core.experiment import Experiment
 from falsifier.core.model import Model, ModelInfo
@@ -96,11 +97,10 @@ def cells(results: list[Run], limit: float) -> list[str]:
     """Falsified runs, simulations and seconds; a run that found nothing counts as the limit."""
     seconds = [r.seconds if r.falsified else limit for r in results]
     simulations = [r.simulations for r in results if r.falsified]
-    error = f" ± {stdev(seconds) / len(seconds) ** 0.5:.2f}" if len(seconds) > 1 else ""
     return [
         f"{len(simulations)}/{len(results)}",
         f"{mean(simulations):.1f}" if simulations else "–",
-        f"{mean(seconds):.2f}{error}",
+        with_error(seconds, 2),
     ]
 
 

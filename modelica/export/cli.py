@@ -67,6 +67,8 @@ def export(source: Path, name: str, target: Path, *, version: int, platforms: tu
 def export_all(folder: Path, names: list[str], platforms: tuple[str, ...]) -> None:
     """Build the FMUs of systems.toml and write SHA256SUMS."""
     table = tomllib.loads(SYSTEMS.read_text(encoding="utf-8"))
+    if unknown := sorted(set(names) - set(table)):
+        raise ExportError(None, f"systems.toml has no entry {', '.join(unknown)}; it has {', '.join(table)}")
     for name, entry in table.items():
         if names and name not in names:
             continue
@@ -121,5 +123,8 @@ def main(arguments: list[str] | None = None) -> int:
             parser.error("specify a model or --all FOLDER")
     except ExportError as error:
         print(f"error: {error}", file=sys.stderr)
+        return 1
+    except RecursionError:
+        print("error: a class contains or extends itself, or is nested too deeply", file=sys.stderr)
         return 1
     return 0

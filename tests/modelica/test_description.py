@@ -132,6 +132,27 @@ def test_refused_with_file_and_line(messages: dict[str, str], name: str) -> None
     assert part in messages[name]
 
 
+@pytest.mark.parametrize(
+    "text", ["model A A a; end A;", "model A extends B; end A; model B extends A; end B;"]
+)
+def test_a_class_of_itself_is_refused(tmp_path: Path, text: str) -> None:
+    (tmp_path / "M.mo").write_text(f"model M {text} A a; end M;")
+    done = run_exporter("M", "--source", str(tmp_path / "M.mo"), "--output", str(tmp_path / "M.fmu"))
+    assert (done.returncode, "contains or extends itself" in done.stderr) == (1, True)
+
+
+def test_an_unknown_entry_of_the_table_is_named(tmp_path: Path) -> None:
+    done = run_exporter("--all", str(tmp_path), "--only", "ATT")
+    assert done.returncode == 1
+    assert "no entry ATT" in done.stderr
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_display_units_say_how_to_convert(build: Build, fmi: int) -> None:
+    text = zipfile.ZipFile(build("Corners", fmi=fmi)).read("modelDescription.xml").decode()
+    assert '<DisplayUnit name="degC" factor="1.0" offset="-273.15"' in text
+
+
 def test_a_missing_file_and_a_missing_model_are_named(tmp_path: Path) -> None:
     done = run_exporter("M", "--source", str(tmp_path / "none.mo"))
     assert done.returncode == 1

@@ -90,6 +90,24 @@ def test_functions(build: Build) -> None:
     assert final(build, "Functions", names, 1) == pytest.approx([3, 3, 5, 2, 2, 6, 9, 12, 1, 11])
 
 
+def test_empty_ranges_results_in_arguments_defaults_and_values_before_an_event(build: Build) -> None:
+    names = ["loops", "own[1]", "own[2]", "value", "atState", "atTick"]
+    assert final(build, "Corners", names, 1, 0.5) == pytest.approx([0, 2, 4, 405, 1.1, 2])
+
+
+def test_a_result_of_another_size_stops_the_simulation(build: Build) -> None:
+    assert "different sizes" in said_on_failure(build("Corners"), ("x",), m=5)
+
+
+def test_a_time_event_is_found_though_times_are_added_up(build: Build) -> None:
+    with opened(build("Corners")) as [fmu]:
+        fmu.start()
+        for _ in range(8):
+            fmu.step(0.1)
+        assert fmu.time < 0.8
+        assert fmu.get("passed") == 1
+
+
 def test_arrays_and_arrays_of_components(build: Build) -> None:
     names = ["v[1]", "v[2]", "v[3]", "last", "both", "total", "slow"]
     c, tanks = math.cos(1), [k * (1 - math.exp(-1 / T)) for k, T in ((1, 1), (2, 2), (3, 4))]

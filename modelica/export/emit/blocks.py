@@ -107,11 +107,12 @@ class Emitter:
                 pointers.append(f"&unused_{k}")
                 continue
             places = [layout.offsets[name] for name in target]
+            size = [str(len(target))] * bool(component.dimensions)
             if places and all(p == (places[0][0], places[0][1] + j) for j, p in enumerate(places)):
-                pointers.append(f"&{layout.slots[target[0]]}")
+                pointers += [f"&{layout.slots[target[0]]}", *size]
                 continue
             before.append(f"{ctype} result_{k}[{max(len(target), 1)}];")
-            pointers.append(f"result_{k}")
+            pointers += [f"result_{k}", *size]
             after += [f"{layout.slots[name]} = result_{k}[{j}];" for j, name in enumerate(target)]
         if len(components) == 1 and not components[0].dimensions:
             target = item.targets[0]

@@ -108,13 +108,13 @@ class Printer:
         if node in self.layout.time_relations:
             late = isinstance(node.left, Time)
             threshold = right if late else left
-            return f"({'' if _time_after(node) else '!'}(m->time >= {threshold}))"
+            return f"({'' if _time_after(node) else '!'}time_reached(m, {threshold}))"
         return f"({left} {node.name} {right})"
 
     def operation(self, node: Op) -> str:
         """Operators and elementary functions."""
         args = [self.text(arg) for arg in node.args]
-        return operation_text(node.name, args, node.type, [arg.type for arg in node.args])
+        return operation_text(node.name, args, node.type)
 
     def pick(self, node: Pick) -> str:
         """Print an array element whose subscripts are known only during simulation."""
@@ -150,7 +150,7 @@ def _time_after(node: Relation) -> bool:
     return (node.name in (">", ">=")) == isinstance(node.left, Time)
 
 
-def operation_text(name: str, args: list[str], kind: Type, types: list[Type]) -> str:
+def operation_text(name: str, args: list[str], kind: Type) -> str:
     """Return an operator or elementary function applied to C texts."""
     suffix = "int" if kind != "Real" else "real"
     match name, args:

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from ..flat import builtin, fold
 from ..flat.evaluate import Evaluator
-from ..flat.ir import FlatModel, Lit, Type
-from ..flat.tensors import type_of
+from ..flat.instance import Scope
+from ..flat.ir import FlatModel, Lit, Tensor, Type
+from ..flat.tensors import fitted, type_of
 from ..order.layout import Layout, c_type, literal
 from ..read.library import find_class, find_constant
 from ..read.syntax import (
@@ -116,7 +117,7 @@ class Expressions:
         kind: Type = "Boolean" if logical or comparing else "Real"
         if kind == "Real" and operator not in ("/", "^") and set(types) == {"Integer"}:
             kind = "Integer"
-        return Value(operation_text(operator.lstrip("."), [arg.text for arg in args], kind, types), kind)
+        return Value(operation_text(operator.lstrip("."), [arg.text for arg in args], kind), kind)
 
     def array(self, expr: ArrayOf, wanted: Type | None = None) -> Value:
         """An array literal."""
@@ -173,7 +174,10 @@ class Expressions:
             raise ExportError(
                 ref.place, f"there is no variable or constant '{ref}' in the function '{self.cls.name}'"
             )
-        value = self.constants.package_constant(*found)
+        return self.known(self.constants.package_constant(*found))
+
+    def known(self, value: Tensor) -> Value:
+        """A value that is known now."""
         texts = tuple(literal(item.value, value.type) for item in value.items if isinstance(item, Lit))
         if not value.dims:
             return Value(texts[0], value.type)
@@ -197,19 +201,30 @@ class Expressions:
             given[name] = expr
         texts = ["m"]
         for item in inputs:
-            source = given.get(item.name, item.modifier.value)
+            source = given.get(item.name)
             if source is None:
-                raise ExportError(call.place, f"the argument '{item.name}' of '{call.name}' is missing")
-            if not item.dimensions:
-                texts.append(self.converted(source, type_of(item)))
-                continue
-            value = self.array(source, type_of(item)) if isinstance(source, ArrayOf) else self.value(source)
+                value = self.default(item, function, call)
+            elif not item.dimensions:
+                value = Value(self.converted(source, type_of(item)), type_of(item))
+            elif isinstance(source, ArrayOf):
+                value = self.array(source, type_of(item))
+            else:
+                value = self.value(source)
             if value.type != type_of(item) or len(value.dims) != len(item.dimensions):
                 raise ExportError(
                     call.place, f"the argument '{item.name}' of '{call.name}' has another type or size"
                 )
             texts += [value.text, *value.dims]
         return function, texts
+
+    def default(self, item: Component, function: Class, call: Call) -> Value:
+        """The value of an input that a call omits, in which names are those of the called function."""
+        if item.modifier.value is None:
+            raise ExportError(call.place, f"the argument '{item.name}' of '{call.name}' is missing")
+        value = self.constants.at(Scope(None, function)).value(item.modifier.value)
+        if not all(isinstance(part, Lit) for part in value.items):
+            raise ExportError(item.place, f"the default of '{item.name}' is not known before simulation")
+        return self.known(fitted(value, value.dims, type_of(item), item.place))
 
     def call(self, call: Call) -> Value:
         """A built-in or a function with one scalar result."""
@@ -226,6 +241,8 @@ class Expressions:
     def builtin(self, call: Call) -> Value:
         """A built-in function."""
         name, place = call.name, call.place
+        if not call.arguments:
+            raise ExportError(place, f"'{name}' needs arguments")
         if name == "size" and len(call.arguments) == 2:
             dims = self.value(call.arguments[0]).dims
             index = self.constants.static_integer(call.arguments[1], place)
@@ -259,4 +276,4 @@ class Expressions:
             raise ExportError(place, f"'{name}' expects {wanted} numeric arguments")
         if name == "integer" and types == ["Real"]:
             texts = [f"floor({texts[0]})"]
-        return Value(operation_text(name, texts, kind, types), kind)
+        return Value(operation_text(name, texts, kind), kind)

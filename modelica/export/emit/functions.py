@@ -81,6 +81,7 @@ class FunctionWriter(Expressions):
             else:
                 if item.causality == "output" and item is not self.single:
                     parameters.append(f"{ctype} *out_{item.name}")
+                    parameters += [f"int to_{item.name}"] * bool(item.dimensions)
                 lines += self.local(item, ctype)
         body, _ = self.cls.algorithms[0]
         lines += self.body(body)
@@ -102,10 +103,7 @@ class FunctionWriter(Expressions):
                 raise ExportError(item.place, f"the size of '{item.name}' must be given")
             lines.append(f"const int n_{item.name}_{k + 1} = {self.integer(dim)};")
         count = " * ".join(f"n_{item.name}_{k + 1}" for k in range(len(item.dimensions)))
-        if item.causality == "output":
-            lines.append(f"{ctype} *v_{item.name} = out_{item.name};")
-        else:
-            lines.append(f"{ctype} v_{item.name}[{count}];")
+        lines.append(f"{ctype} v_{item.name}[{count}];")
         lines.append(f"for (int k = 0; k < {count}; k++) v_{item.name}[k] = 0;")
         if item.modifier.value:
             lines += self.copy(self.whole(item.name, item.place), self.value(item.modifier.value), item.place)
@@ -115,7 +113,18 @@ class FunctionWriter(Expressions):
         """Print the statements that return the outputs."""
         if self.single:
             return [f"return v_{self.single.name};"]
-        return [f"*out_{c.name} = v_{c.name};" for c in self.outputs if not c.dimensions]
+        lines = []
+        for c in self.outputs:
+            if not c.dimensions:
+                lines.append(f"*out_{c.name} = v_{c.name};")
+                continue
+            # Copied at the end, because the result may be assigned to an argument: x := f(x).
+            count = " * ".join(self.whole(c.name, c.place).dims)
+            lines.append(f"same_size(m, to_{c.name}, {count});")
+            lines.append(
+                f"for (int k = 0; k < to_{c.name} && k < {count}; k++) out_{c.name}[k] = v_{c.name}[k];"
+            )
+        return lines
 
     def body(self, items: Body) -> list[str]:
         """A block of statements."""
@@ -153,10 +162,13 @@ class FunctionWriter(Expressions):
         """Print a for loop over a range of Integers."""
         if not isinstance(item.over, Range):
             raise ExportError(item.place, "a for loop in a function needs a range 'a:b' or 'a:step:b'")
+        if item.index in self.indices:
+            raise ExportError(item.place, f"the index '{item.index}' is already that of an outer loop")
         step = 1
         if item.over.step is not None:
             value = self.constants.static_integer(item.over.step, item.place)
-            step = value or 1
+            if not (step := value):
+                raise ExportError(item.place, "the step of a range must not be 0")
         first, last = self.integer(item.over.first), self.integer(item.over.last)
         name = f"i_{item.index}"
         self.indices[item.index] = "Integer"
@@ -193,11 +205,10 @@ class FunctionWriter(Expressions):
             raise ExportError(place, "expected an array, found a scalar; use fill(...)")
         if len(value.dims) != len(target.dims):
             raise ExportError(place, "the two sides of ':=' have different numbers of dimensions")
-        size = " * ".join(value.dims)
-        check = f"same_size(m, {count}, {size});"
+        checks = [f"same_size(m, {a}, {b});" for a, b in zip(target.dims, value.dims, strict=True)]
         source, goal = c_type(value.type), c_type(target.type)
         return [
-            check,
+            *checks,
             f"{{ const {source} *from = {value.text}; {goal} *to = {target.text}; int n = {count};",
             f"  if (to < ({goal} *)from) for (int k = 0; k < n; k++) to[k] = from[k];",
             "  else for (int k = n - 1; k >= 0; k--) to[k] = from[k]; }",
@@ -227,7 +238,7 @@ class FunctionWriter(Expressions):
                 raise ExportError(
                     place, f"'{ref}' does not have the type and dimensions of the output '{output.name}'"
                 )
-            pointers.append(target.text if target.dims else f"&{target.text}")
+            pointers += [target.text, " * ".join(target.dims)] if target.dims else [f"&{target.text}"]
         if len(outputs) == 1 and not outputs[0].dimensions:
             return (
                 [f"{self.target(left[0]).text} = {c_name(function.full_name)}({', '.join(args)});"]

@@ -70,8 +70,9 @@ def _lively(system: System) -> list[Block]:
 
 
 def slope_blocks(system: System) -> list[Block]:
-    """Return the blocks that compute the derivatives."""
-    return needed_for({f"der({name})" for name in system.states}, _lively(system))
+    """Return the blocks that are needed at every point: for the derivatives, and for `pre` at an event."""
+    before = system.before[len(system.discrete_reals) :]
+    return needed_for({f"der({name})" for name in system.states} | set(before), _lively(system))
 
 
 def needed_for(names: set[str], blocks: list[Block]) -> list[Block]:

@@ -21,7 +21,17 @@ from .ir import (
     Var,
     names_in,
 )
-from .parts import TRUE, assertion, loop_values, name_of, outputs, refuse_when, reinit, with_index
+from .parts import (
+    TRUE,
+    assertion,
+    loop_values,
+    name_of,
+    outputs,
+    refuse_reinit,
+    refuse_when,
+    reinit,
+    with_index,
+)
 from .tensors import fitted
 from .whens import when_condition
 
@@ -71,6 +81,7 @@ def _statement(item: Item, here: Evaluator, model: FlatModel, made: list[Stateme
             cases = []
             with here.without_events():
                 for edge, (_, body) in zip(conditions, branches, strict=True):
+                    refuse_reinit(edge, body)
                     cases.append((edge, tuple(statements(body, here, model, guard))))
             made.append(Branch(tuple(cases), (), place))
         case Run(call, place) if call.name == "reinit":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
 from math import prod
 
 from ..read.syntax import Call, ExportError, Place
@@ -116,6 +117,8 @@ def call(evaluator: Evaluation, node: Call) -> Tensor:
         raise ExportError(node.place, _REFUSED[node.name])
     if node.named:
         raise ExportError(node.place, f"'{node.name}' does not accept named arguments")
+    if not node.arguments and node.name != "initial":
+        raise ExportError(node.place, f"'{node.name}' needs arguments")
     if node.name in fold.REAL_FUNCTIONS:
         return _map(evaluator, node, lambda args: fold.function(node.name, args, node.place))
     return _CALLS[node.name](evaluator, node)
@@ -191,10 +194,11 @@ def _extreme(evaluator: Evaluation, node: Call) -> Tensor:
     items = args[0].items if len(args) == 1 else args[0].items + args[1].items
     if len(args) == 2 and (args[0].dims or args[1].dims):
         raise ExportError(node.place, f"'{node.name}' expects two scalars or one array")
-    result = items[0]
-    for item in items[1:]:
-        result = fold.arithmetic(node.name, (result, item), node.place)
-    return scalar_tensor(result)
+    if not items:
+        raise ExportError(node.place, f"'{node.name}' of an empty array has no value")
+    return scalar_tensor(
+        reduce(lambda one, other: fold.arithmetic(node.name, (one, other), node.place), items)
+    )
 
 
 def _variable(evaluator: Evaluation, node: Call) -> Tensor:
@@ -218,7 +222,10 @@ def _pre(evaluator: Evaluation, node: Call) -> Tensor:
 
 
 def _change(evaluator: Evaluation, node: Call) -> Tensor:
-    item = _variable(evaluator, node).items[0]
+    value = _variable(evaluator, node)
+    if value.dims:
+        raise ExportError(node.place, f"'{node.name}' needs a scalar")
+    item = value.items[0]
     assert isinstance(item, Var)
     if item.type == "Real" or (node.name == "edge" and item.type != "Boolean"):
         raise ExportError(node.place, f"'{node.name}' of {item.type} is not supported")
@@ -242,7 +249,7 @@ def _ordinal(evaluator: Evaluation, node: Call) -> Tensor:
 
 def _without_events(evaluator: Evaluation, node: Call) -> Tensor:
     with evaluator.without_events():
-        return _args(evaluator, node, 1, 2)[-1]
+        return _args(evaluator, node, 2 if node.name == "smooth" else 1)[-1]
 
 
 def _size(evaluator: Evaluation, node: Call) -> Tensor:
@@ -275,10 +282,9 @@ def _reduce(evaluator: Evaluation, node: Call) -> Tensor:
     items = list(_args(evaluator, node, 1)[0].items)
     if node.name == "sum":
         return scalar_tensor(_sum(items, node.place))
-    result = items[0]
-    for item in items[1:]:
-        result = fold.arithmetic("*", (result, item), node.place)
-    return scalar_tensor(result)
+    one: Scalar = Lit(1.0, "Real")
+    product = reduce(lambda a, b: fold.arithmetic("*", (a, b), node.place), items) if items else one
+    return scalar_tensor(product)
 
 
 def _transpose(evaluator: Evaluation, node: Call) -> Tensor:
@@ -293,7 +299,7 @@ def _transpose(evaluator: Evaluation, node: Call) -> Tensor:
 def _cat(evaluator: Evaluation, node: Call) -> Tensor:
     axis = evaluator.static_integer(node.arguments[0], node.place)
     parts = [evaluator.value(text) for text in node.arguments[1:]]
-    if axis != 1 or any(part.dims[1:] != parts[0].dims[1:] or not part.dims for part in parts):
+    if axis != 1 or not parts or any(part.dims[1:] != parts[0].dims[1:] or not part.dims for part in parts):
         raise ExportError(
             node.place, "'cat' is only supported along dimension 1, for arrays with equal other sizes"
         )

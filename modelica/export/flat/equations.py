@@ -7,7 +7,7 @@ from . import fold
 from .delays import spatial_distribution
 from .evaluate import Evaluator
 from .ir import DelayLine, Der, Equation, FlatModel, Lit, Outputs, Scalar, Tensor, Var, alike, is_delayed
-from .parts import TRUE, assertion, loop_values, outputs, refuse_when, with_index
+from .parts import TRUE, assertion, loop_values, outputs, refuse_when, set_once, with_index
 from .whens import when_equation
 
 
@@ -86,14 +86,15 @@ def _branch_equations(body: Body, here: Evaluator, model: FlatModel) -> dict[str
     before = len(model.equations)
     for part in body:
         equation(part, here, model)
-    made, found = model.equations[before:], {}
+    made = model.equations[before:]
+    found: dict[str, Equation] = {}
     del model.equations[before:]
     for item in made:
         if isinstance(item, DelayLine) or (isinstance(item, Equation) and _of_a_delay(item)):
             model.equations.append(item)
         elif isinstance(item, Equation) and isinstance(item.left, (Var, Der)):
             key = item.left.name if isinstance(item.left, Var) else f"der({item.left.name})"
-            found[key] = item
+            set_once(found, {key: item})
         elif isinstance(item, Outputs) and all(t and t[0].startswith("$call") for t in item.targets):
             model.equations.append(item)
         else:

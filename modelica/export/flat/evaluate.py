@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from math import prod
+from math import floor, prod
 
 from ..read.library import enumeration, find_class, find_constant, lookup
 from ..read.syntax import (
@@ -140,7 +140,7 @@ class Evaluator:
         first, step, last = (value.value for value in values)
         if step == 0:
             raise ExportError(expr.place, "the step of a range must not be 0")
-        count = max(0, int((last - first) / step + 1e-9) + 1)
+        count = max(0, floor((last - first) / step + 1e-9) + 1)
         kind: Type = "Integer" if all(value.type == "Integer" for value in values) else "Real"
         return Tensor((count,), tuple(Lit(first + k * step, kind) for k in range(count)), kind)
 

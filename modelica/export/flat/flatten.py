@@ -186,11 +186,19 @@ def _experiment(cls: Class, model: FlatModel) -> None:
             )
         value = _literal(mod.value, mod.place)
         words = SOLVER_SETTINGS[name]
-        positive = not isinstance(value, (str, bool)) and value > 0
+        whole = name in ("checks", "delayPoints")
+        positive = not isinstance(value, (str, bool)) and value > 0 and not (whole and value % 1)
         if value not in words if words else not positive:
-            allowed = f"one of {', '.join(words)}" if words else "a number above 0"
+            number = f"a {'whole ' * whole}number above 0"
+            allowed = f"one of {', '.join(words)}" if words else number
             raise ExportError(mod.place, f"'{name}' must be {allowed}")
         model.solver[name] = value
+    fixed = model.solver.get("method", "adaptive") == "fixed"
+    if unused := {"step", "maxStep"} & set(model.solver) - {"step" if fixed else "maxStep"}:
+        place = settings["__falsifier_solver"].place
+        raise ExportError(
+            place, f"'{unused.pop()}' has no effect with this method: 'step' is for \"fixed\" only"
+        )
 
 
 def _number(settings: dict[str, Modifier], name: str) -> float | None:

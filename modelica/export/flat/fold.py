@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from ..read.syntax import ExportError, Place
+from ..read.syntax import LARGEST_INTEGER, ExportError, Place
 from .ir import NUMBERS, Cond, Lit, Op, Relation, Scalar, Type, alike
 
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {
@@ -50,7 +50,9 @@ def _joined(args: tuple[Scalar, ...], place: Place, name: str) -> Type:
 
 def arithmetic(name: str, args: tuple[Scalar, ...], place: Place) -> Scalar:
     """`+ - * / ^ neg` and min, max, abs, sign, div, mod, rem of numbers, without events."""
-    kind: Type = "Real" if name in ("/", "^") else _joined(args, place, name)
+    kind = _joined(args, place, name)
+    if name in ("/", "^"):
+        kind = "Real"
     if name == "sign":
         kind = "Integer"
     if not all(isinstance(arg, Lit) for arg in args):
@@ -62,6 +64,8 @@ def arithmetic(name: str, args: tuple[Scalar, ...], place: Place) -> Scalar:
         raise ExportError(
             place, f"'{name}' of {', '.join(map(str, values))} cannot be computed: {error}"
         ) from None
+    if kind == "Integer" and not -LARGEST_INTEGER <= result <= LARGEST_INTEGER:
+        raise ExportError(place, f"{int(result)} is too large for an Integer, which has 32 bits")
     return Lit(float(result) if kind == "Real" else int(result), kind)
 
 

@@ -336,20 +336,17 @@ class FlatModel:
     solver: dict[str, float | str | bool] = field(default_factory=dict)
 
 
-def names_in(node: Scalar, keep: Callable[[Scalar], bool] = lambda _: True) -> set[str]:
+def names_in(node: Scalar) -> set[str]:
     """Return the names of variables and derivatives (`der(x)`) whose current value an expression needs."""
     found = set()
     for part in walk(node):
-        if isinstance(part, Var) and keep(part):
+        if isinstance(part, Var):
             found.add(part.name)
         elif isinstance(part, Der):
             found.add(f"der({part.name})")
         elif isinstance(part, Edge):
             found.add(f"when({part.index})")
     return found
-
-
-REAL_ZERO = Lit(0.0, "Real")
 
 
 # Receives what is taken out of expressions.

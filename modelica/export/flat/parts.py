@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..read.library import find_class
-from ..read.syntax import Body, Call, ExportError, Expr, Place, Several, Text, When
+from ..read.syntax import Body, Call, ExportError, Expr, For, If, Place, Run, Several, Text, When
 from . import fold
 from .calls import arguments, function_outputs, lifted
 from .evaluate import Evaluator
-from .ir import Assert, DelayLine, Equation, Lit, Outputs, Reinit, Scalar, Tensor, Var
+from .ir import Assert, DelayLine, Equation, Initial, Lit, Outputs, Reinit, Scalar, Tensor, Var, walk
 from .tensors import fitted
 
 TRUE = Lit(value=True, type="Boolean")
@@ -64,6 +64,14 @@ def _target_names(target: Tensor, result: Tensor, place: Place) -> tuple[str, ..
     return tuple(name_of(item, place) for item in target.items)
 
 
+def set_once(found: dict[str, Equation], more: dict[str, Equation]) -> None:
+    """Add equations of one branch by what they set; a variable that is set twice would lose one of them."""
+    for name, item in more.items():
+        if name in found:
+            raise ExportError(item.place, f"'{name}' already has an equation here, at {found[name].place}")
+        found[name] = item
+
+
 def name_of(item: Scalar, place: Place) -> str:
     """Return the name of a variable on a left side."""
     if not isinstance(item, Var):
@@ -78,6 +86,23 @@ def refuse_when(body: Body) -> None:
             raise ExportError(
                 item.place, "'when' inside 'if' is not supported; put the condition into the when clause"
             )
+
+
+def refuse_reinit(edge: Scalar, body: Body) -> None:
+    """Reject `reinit` in a when clause that acts at the start, where it would be passed over."""
+    if not any(isinstance(part, Initial) for part in walk(edge)):
+        return
+    for item in body:
+        if isinstance(item, Run) and item.call.name == "reinit":
+            raise ExportError(
+                item.place,
+                "'reinit' when 'initial()' is not supported; use an initial equation or a start value",
+            )
+        if isinstance(item, If):
+            for inner in (*(inner for _, inner in item.branches), item.otherwise):
+                refuse_reinit(edge, inner)
+        if isinstance(item, For):
+            refuse_reinit(edge, item.body)
 
 
 def reinit(call: Call, here: Evaluator, guard: Scalar) -> list[Reinit]:

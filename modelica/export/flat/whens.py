@@ -21,7 +21,7 @@ from ..read.syntax import (
 from . import fold
 from .evaluate import Evaluator
 from .ir import Condition, Edge, Equation, FlatModel, Initial, Lit, Pre, Scalar, Tick, Var
-from .parts import TRUE, assertion, loop_values, name_of, reinit, with_index
+from .parts import TRUE, assertion, loop_values, name_of, refuse_reinit, reinit, set_once, with_index
 from .tensors import cast, fitted
 
 
@@ -66,6 +66,7 @@ def when_equation(item: When, here: Evaluator, model: FlatModel) -> None:
     earlier: Scalar = Lit(value=False, type="Boolean")
     for text, body in item.branches:
         edge = when_condition(text, here, model, model.equations.append)
+        refuse_reinit(edge, body)
         guard = fold.logic("and", (edge, fold.logic("not", (earlier,), item.place)), item.place)
         with here.without_events():
             cases.append((edge, _when_body(body, guard, here, model)))
@@ -91,7 +92,7 @@ def _when_body(body: Body, guard: Scalar, here: Evaluator, model: FlatModel) -> 
                 target, value = here.value(left), here.value(right)
                 value = fitted(value, target.dims, target.type, place)
                 for one, other in zip(target.items, value.items, strict=True):
-                    found[name_of(one, place)] = Equation(one, other, place, discrete=True)
+                    set_once(found, {name_of(one, place): Equation(one, other, place, discrete=True)})
             case Several(place=place):
                 raise ExportError(
                     place,
@@ -100,9 +101,9 @@ def _when_body(body: Body, guard: Scalar, here: Evaluator, model: FlatModel) -> 
                 )
             case For(index, over, inner, place):
                 for value_ in loop_values(over, here, place):
-                    found |= _when_body(inner, guard, with_index(here, index, value_), model)
+                    set_once(found, _when_body(inner, guard, with_index(here, index, value_), model))
             case If():
-                found |= _when_if(item, guard, here, model)
+                set_once(found, _when_if(item, guard, here, model))
             case Run(call, place) if call.name == "reinit":
                 model.equations.extend(reinit(call, here, guard))
             case Run(call, place) if call.name == "assert":

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from ..flat.ir import (
+    Branch,
     Condition,
     DelayLine,
     FlatModel,
@@ -15,6 +16,7 @@ from ..flat.ir import (
     Relation,
     Scalar,
     Section,
+    Statement,
     Tick,
     Time,
     Type,
@@ -23,7 +25,7 @@ from ..flat.ir import (
     walk,
 )
 from ..read.syntax import ExportError
-from .contents import Solved, values, when_targets
+from .contents import Solved, targets, values, when_targets
 from .parameters import fixed_names
 from .sort import Block
 
@@ -179,6 +181,29 @@ def _events(system: System) -> None:
                     layout.floors.setdefault(part.arg, len(layout.floors))
                 elif isinstance(part, Relation):
                     _relation(part, layout, varying, system.model)
+    for block in system.blocks:
+        if isinstance(block.item, Section):
+            _refuse_set_again(block.item.statements, layout, set())
+
+
+def _refuse_set_again(statements: tuple[Statement, ...], layout: Layout, compared: set[str]) -> None:
+    """Reject setting a variable again after a relation of it: events are found by the last value."""
+    frozen = {*layout.relations, *layout.time_relations, *(Floor(arg) for arg in layout.floors)}
+    for item in statements:
+        own = [condition for condition, _ in item.branches] if isinstance(item, Branch) else values(item)
+        compared |= {n for value in own for part in walk(value) if part in frozen for n in names_in(part)}
+        if isinstance(item, Branch):
+            bodies = [*(body for _, body in item.branches), item.otherwise]
+            after = [set(compared) for _ in bodies]
+            for body, found in zip(bodies, after, strict=True):
+                _refuse_set_again(body, layout, found)
+            compared |= set().union(*after)
+        elif again := sorted(compared & set(targets(item))):
+            raise ExportError(
+                item.place,
+                f"'{again[0]}' is set again after the algorithm has compared it, so that its event "
+                "cannot be found; use another variable, or noEvent(...)",
+            )
 
 
 def _relation(part: Relation, layout: Layout, varying: set[str], model: FlatModel) -> None:

@@ -102,7 +102,7 @@ def _candidates(item: Equation, free: set[str]) -> dict[str, Scalar]:
         counts: dict[str, int] = {}
         for part in walk(one):
             name = bare_name(part)
-            if name in free:
+            if name in free and part.type == "Real":  # an Integer would lose its fraction
                 counts[name] = counts.get(name, 0) + 1
         for name, count in counts.items():
             if count == 1 and name not in names_in(other) and name not in found:

@@ -10,6 +10,7 @@ from ..flat.ir import (
     Condition,
     DelayLine,
     Der,
+    Equation,
     FlatModel,
     Floor,
     Outputs,
@@ -72,7 +73,11 @@ def sort(model: FlatModel, states: list[str]) -> list[Block]:
 def sort_initial(model: FlatModel, states: list[str]) -> list[Block]:
     """Return the order of the initial system, in which states with an initial equation are unknowns too."""
     unknown = _unknowns(model, states)
-    given = {e.left.name: e for e in model.initial_equations if isinstance(e.left, Var)}
+    given: dict[str, Equation] = {}
+    for one in model.initial_equations:
+        if isinstance(one.left, Var) and given.setdefault(one.left.name, one) is not one:
+            place = given[one.left.name].place
+            raise ExportError(one.place, f"'{one.left.name}' already has an initial equation at {place}")
     items: list[Computed] = [
         Solved(name, equation.right, equation.place)
         for name, equation in given.items()

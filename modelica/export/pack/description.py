@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from ..flat.ir import Lit, Type, Variable
 from ..order.layout import System, kinds_of
-from .units import base_unit
+from .units import base_unit, display_unit
 
 GUID_MARK = "{GUID}"
 
@@ -99,7 +99,8 @@ def _typed(variable: Variable | None, kind: str) -> dict[str, str]:
     if kind == "Real":
         if variable.unit:
             found["unit"] = variable.unit
-        if variable.display_unit and variable.display_unit != variable.unit:
+        other = variable.display_unit != variable.unit
+        if variable.display_unit and other and display_unit(variable.display_unit, variable.unit):
             found["displayUnit"] = variable.display_unit
     if kind != "Boolean":
         for key, value in (("min", variable.minimum), ("max", variable.maximum)):
@@ -143,7 +144,7 @@ def _units(parent: Element, shown: list[Entry]) -> None:
         if base is not None:
             SubElement(unit, "BaseUnit", base)
         for display in sorted(used[name]):
-            SubElement(unit, "DisplayUnit", name=display)
+            SubElement(unit, "DisplayUnit", {"name": display} | (display_unit(display, name) or {}))
 
 
 def _experiment(parent: Element, system: System) -> None:

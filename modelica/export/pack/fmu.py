@@ -23,7 +23,15 @@ _HEADERS = ("model.h", "instance.h", "step.h")
 _COMMON = ("events.c", "lines.c", "integrate.c", "cosimulation.c", "instance.c")
 
 
-_WARNINGS = ("-Wall", "-Wextra", "-Werror", "-Wno-parentheses-equality", "-Wno-unused", "-Wno-type-limits")
+_WARNINGS = (
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-Wno-parentheses-equality",
+    "-Wno-unused",
+    "-Wno-unused-parameter",
+    "-Wno-type-limits",
+)
 
 
 # No fused multiply-adds (-ffp-contract=off): they round differently, so results would depend on the platform.

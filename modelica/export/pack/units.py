@@ -50,6 +50,21 @@ _UNITS: dict[str, dict[str, float]] = {
 }
 
 
+def display_unit(name: str, unit: str | None) -> dict[str, str] | None:
+    """Return the attributes of the DisplayUnit element; None if the units are not known as alike."""
+    shown, stored = _UNITS.get(name), _UNITS.get(unit or "")
+    if shown is None or stored is None:
+        return None
+    scale = ("factor", "offset")
+    if {k: v for k, v in shown.items() if k not in scale} != {
+        k: v for k, v in stored.items() if k not in scale
+    }:
+        return None
+    factor = shown.get("factor", 1.0)
+    offset = (stored.get("offset", 0.0) - shown.get("offset", 0.0)) / factor
+    return {"factor": repr(stored.get("factor", 1.0) / factor), "offset": repr(offset)}
+
+
 def base_unit(name: str) -> dict[str, str] | None:
     """Return the attributes of the BaseUnit element; None for an unknown unit."""
     found = _UNITS.get(name)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 from .syntax import (
+    LARGEST_INTEGER,
     ArrayOf,
     Assign,
     Body,
@@ -213,9 +215,12 @@ class BodyReader:
         match type(ctx).__name__:
             case "Primary_unsigned_numberContext":
                 try:
-                    return Number(int(text) if text.isdigit() else float(text), place)
+                    number = int(text) if text.isdigit() else float(text)
                 except ValueError:
                     raise ExportError(place, f"'{text}' is not a number") from None
+                if number > (LARGEST_INTEGER if isinstance(number, int) else sys.float_info.max):
+                    raise ExportError(place, f"{text} is too large for a number of this type")
+                return Number(number, place)
             case "Primary_stringContext":
                 return Text(self.string(text), place)
             case "Primary_trueContext":

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+LARGEST_INTEGER = 2**31 - 1
+"""Integers of the exported C have 32 bits."""
+
 
 @dataclass(frozen=True, slots=True)
 class Place:

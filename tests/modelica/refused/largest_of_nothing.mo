@@ -1,0 +1,3 @@
+model M
+  Real x = max(zeros(0));  // error: empty
+end M;

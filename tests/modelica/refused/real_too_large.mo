@@ -1,0 +1,3 @@
+model M
+  Real x = 1e400 * time;  // error: too large
+end M;

@@ -1,0 +1,3 @@
+model M
+  Integer n = size();  // error: needs arguments
+end M;
