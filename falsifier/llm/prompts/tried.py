@@ -100,13 +100,12 @@ class Tried:
             part = min(int(r.share_of(value) * _PARTS), _PARTS - 1)
             in_part[part] = max(in_part[part], stay)
         short, told = np.flatnonzero(in_part < _BRIEF * stop_time), list[str]()
-        for run in (
-            np.split(short, np.flatnonzero(np.diff(short) > 1) + 1) if len(short) in _SOME_PARTS else ()
-        ):
+        runs = np.split(short, np.flatnonzero(np.diff(short) > 1) + 1) if len(short) in _SOME_PARTS else []
+        for run in runs:
             begin, end = bounds(r.at(int(run[0]) / _PARTS), r.at((int(run[-1]) + 1) / _PARTS), _DIGITS)
             most = float(in_part[run].max())
-            stay = f" for more than {number(most, _DIGITS + 1)} s" if most else ""
-            told.append(f"{'' if most else 'constant '}between {begin} and {end}{stay}")
+            beyond = f" for more than {number(most, _DIGITS + 1)} s" if most else ""
+            told.append(f"{'' if most else 'constant '}between {begin} and {end}{beyond}")
         return ", ".join(told)
 
 
