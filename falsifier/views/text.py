@@ -106,9 +106,11 @@ def results_text(results: Sequence[Result]) -> str:
     spent = spent_together((result.directory, result.spent) for result in results)
     lines.append(f"{falsified} of {len(results)} falsified ({seconds_text(spent)})")
     lines += [f"language model: {llm_use(spent)}"] if spent.questions else []
-    directories = {result.directory for result in results}
-    if len(directories) == 1 and results[0].directory is not None and any(map(_can_continue, results)):
-        lines.append(_continue_line(results[0].directory))
+    places = {result.directory for result in results if result.directory is not None}
+    if len(places) > 1:  # requirements that are searched one after the other are below one directory
+        places = {place.parent for place in places}
+    if len(places) == 1 and any(map(_can_continue, results)):
+        lines.append(_continue_line(*places))
     lines += dict.fromkeys(f"failed: {result.reason}" for result in results if result.status == "failed")
     return "\n".join(map(one_line, lines))
 

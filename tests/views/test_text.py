@@ -141,7 +141,9 @@ def test_the_time_of_searches_one_after_the_other_is_their_sum(tmp_path: Path) -
     problems = [impossible(), lag_problem(points=2, name="APART")]
     results = falsify(problems, "corners", budget=1, directory=tmp_path)
     timed = [replace(r, spent=Spent(simulations=1, seconds=1.5)) for r in results]
-    assert "(3.0 s; simulator" in results_text(timed)
+    assert "(3.0 s; simulator" in results_text(timed) and "to continue" not in results_text(timed)
+    stopped = [replace(timed[0], status="interrupted"), timed[1]]
+    assert results_text(stopped).endswith(f"to continue: falsifier resume {tmp_path}")
 
 
 def test_json_has_the_same_and_plain_values_only(found: Result) -> None:
