@@ -119,6 +119,14 @@ def private_folder(folder: Path) -> Path | None:
     return folder if is_private and os.access(folder, os.W_OK) else None
 
 
+def below_home(path: str) -> Path:
+    """Return a path in which ``~`` is the home of a user; as it is if there is no such user.
+
+    Path.expanduser() fails for those.
+    """
+    return Path(os.path.expanduser(path))  # noqa: PTH111
+
+
 def absent(path: Path) -> str:
     """Say that there is no file to read: nothing at all, or a folder."""
     if path.is_dir():

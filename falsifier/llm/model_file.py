@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from falsifier.core import posix
-from falsifier.core.files import cache_directory
+from falsifier.core.files import below_home, cache_directory
 from falsifier.core.literals import printable
 from falsifier.core.secrets import scrubbed
 from falsifier.errors import ChatSetupError
@@ -54,7 +54,7 @@ def check_model_file(llm: str) -> Path:
     Raises:
         ChatSetupError: if it is not a model, the server is not installed, or memory is too small.
     """
-    path = Path(llm).expanduser().absolute()
+    path = below_home(llm).absolute()
     try:
         with path.open("rb") as file:
             begins_well = file.read(len(_MAGIC)) == _MAGIC

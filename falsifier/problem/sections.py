@@ -254,7 +254,7 @@ class CouplingSection(Section):
         "has converged.",
     )
     max_rounds: Count = Field(
-        100, ge=1, description="Maximum number of rounds of an initialisation, and of an iterated step."
+        100, ge=2, description="Maximum number of rounds of an initialisation, and of an iterated step."
     )
     isolation: Isolation = Field(
         "together",

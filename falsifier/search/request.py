@@ -1,10 +1,10 @@
 """What a user requested, as one value: enough to run it, record it and repeat it."""
 
-from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, ConfigDict, Field, ValidationInfo, field_validator, model_validator
 
+from falsifier.core.files import below_home
 from falsifier.core.literals import shell_word
 from falsifier.core.secrets import holds_credentials, is_secret_option, without_credentials
 from falsifier.core.strict import Strict
@@ -89,7 +89,7 @@ class LLMSettings(Strict):
     @classmethod
     def _whole_path(cls, name: str) -> str:
         """The whole path of a model file, so that a run can be resumed from any folder."""
-        return str(Path(name).expanduser().absolute()) if is_model_file(name) else name
+        return str(below_home(name).absolute()) if is_model_file(name) else name
 
     @field_validator("options")
     @classmethod

@@ -277,6 +277,7 @@ def test_an_address_is_recorded_without_its_password_and_used_with_it(
         LLMSettings(name="openai/mine")
     assert "word@" not in str(caught.value)
     assert LLMSettings(name="/some/model.gguf").api_base is None  # it has a server of its own
+    assert LLMSettings(name="~nobody-of-this-name/a.gguf").name.endswith("/~nobody-of-this-name/a.gguf")
 
 
 @pytest.mark.parametrize(

@@ -89,6 +89,7 @@ WRONG = [
     (COMPONENTS + "step = 100\n" + REST, "components.pi.step: 100 s is longer than the simulation"),
     (COMPONENTS.replace("Gain_2.fmu", "inner.ssp") + REST, "an SSP package cannot be a component"),
     (COMPONENTS.replace("[components.pi]", "[components.'']") + REST, "the name of a component is empty"),
+    (COMPONENTS + "[coupling]\nmax_rounds = 1\n" + REST, "coupling.max_rounds: "),
     (COMPONENTS + '[coupling]\nmetod = "jacobi"\n' + REST, "coupling.metod: unknown key; did you mean 'm"),
 ]
 

@@ -49,7 +49,7 @@ class Coupling:
         for name, kind in words.items():
             one_of(f"coupling.{name}", getattr(self, name), get_args(kind))
         positive("coupling.tolerance", self.tolerance)
-        whole("coupling.max_rounds", self.max_rounds, least=1)
+        whole("coupling.max_rounds", self.max_rounds, least=2)  # the second one shows that nothing changes
         if self.loops == "iterate" and self.method == "jacobi":
             raise SpecError(
                 'coupling.loops: with the method "jacobi" every connection has a delay, and no step is '

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from shlex import quote
 
+from falsifier.core.files import below_home
 from falsifier.core.literals import printable
 from falsifier.core.words import first_few, listed
 from falsifier.errors import SpecError, did_you_mean, written
@@ -106,8 +107,7 @@ def _advice(word: str) -> str:
 def _kind_and_path(word: str) -> tuple[str, Path | None]:
     """Split what is allowed with a path; None for all else."""
     kind, _, path = word.partition(":")
-    path = os.path.expanduser(path.strip())  # noqa: PTH111 (Path.expanduser fails for unknown users)
-    return kind, Path(path) if kind in _PATHS and path else None
+    return kind, below_home(path.strip()) if kind in _PATHS and path.strip() else None
 
 
 def hidden_places(environment: Mapping[str, str], homes: Sequence[Path], *, is_root: bool) -> tuple[str, ...]:
