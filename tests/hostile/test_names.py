@@ -224,7 +224,7 @@ def test_starter_specs_of_any_fmu_are_toml(name: str, text: str, unit: str) -> N
     assert set(spec) <= {"model", "inputs", "parameters", "requirements"}
 
 
-@given(names.map(lambda name: name.encode(errors="ignore").decode()))  # others are refused
+@given(names.map(lambda name: name.encode(errors="ignore").decode().replace("\0", "")))  # others are refused
 def test_shell_commands_are_one_word_per_argument(name: str) -> None:
     from falsifier.views.report.wording import run_command
 
