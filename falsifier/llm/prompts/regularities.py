@@ -91,7 +91,6 @@ class Regularities:
         at = np.flatnonzero(changed[is_switched].any(axis=0))
         self._switched.append(unchanged[:, at[:: max(1, len(at) // _TIMES)]])
         then = np.vstack((before[:first], values[first:], before[first:], switched, unchanged, times))
-        rows = then.T + 0.0  # there are two zeros, with other bytes
         for place, name in enumerate(self._recorded):
             column = inside[name]
             if name in discrete:
@@ -109,7 +108,8 @@ class Regularities:
                 pairs = list(zip(column[at - 1].tolist(), column[at].tolist(), strict=True))
                 ends = {v: value_text(self.view, name, v) for v in {*chain(*pairs)} if not change}
                 self._levels[name].update(ends)
-                for (old, new), row in zip(pairs, rows[at], strict=True):
+                rows = then[:, at].T + 0.0  # there are two zeros, with other bytes
+                for (old, new), row in zip(pairs, rows, strict=True):
                     told = change or f"{ends[old]} -> {ends[new]}"
                     self._seen[name][told, new > old][row.tobytes()] = None
 
@@ -187,9 +187,8 @@ class Regularities:
             ends = (dict.fromkeys(told(v, column_decimals(usual)) for v in one) for one in ranges)
             text = form.format(name=name, values=" or ".join(map(" to ".join, ends)))
             found[kind, name] = share, width, text
-        if own := found.pop(
-            (2, without), None
-        ):  # it is a time limit, and what others had since then is chance
+        # How long it had its own value is a time limit, and how long others had theirs since then is chance.
+        if own := found.pop((2, without), None):
             is_timer = not any(kind == 0 for kind, _ in found)
             found = {key: each for key, each in found.items() if key[0] < 2}
             found |= {(2, without): own} if is_timer else {}
