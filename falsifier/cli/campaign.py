@@ -178,8 +178,8 @@ def watch(*, directory: Path, page: bool, allow_stop: bool) -> None:
     for run in () if is_retried else progress.runs:
         say(str(replace(run, status="interrupted") if run.status == "running" else run))
     say(overall_line(progress, stopped=True))
-    ended = (r.status == "failed" and r.spent.has_mostly_failed and not is_retried for r in progress.runs)
-    if progress.finished + sum(ended) < len(progress.runs):
+    ended = [r for r in progress.runs if r.status == "failed" and r.unjudged and not is_retried]
+    if progress.finished + len(ended) < len(progress.runs):
         say(f"stopped; to continue: falsifier resume {shell_word(directory)}")
 
 

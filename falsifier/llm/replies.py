@@ -134,7 +134,8 @@ class ReplyForm:
         self, number: int, signals: dict[str, Signal], parameters: dict[str, float]
     ) -> tuple[dict[str, Signal], dict[str, float]]:
         """Return signals and parameters with those of a sample where they are left out; 0: of none."""
-        if not number or self.samples is None:
+        is_complete = {*signals, *parameters}.issuperset(self.space.names)
+        if not number or self.samples is None or is_complete:
             return signals, parameters
         if not 0 < number <= len(self.samples):
             raise RejectedReplyError(

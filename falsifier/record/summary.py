@@ -53,6 +53,11 @@ class Summary:
         return self.status in ("falsified", "not falsified")
 
     @property
+    def unjudged(self) -> str:
+        """That it could not be judged in most simulations, in words; empty if it could."""
+        return mostly_unjudged([None if isnan(r) else r for r in self._robustness])
+
+    @property
     def failures(self) -> tuple[Failure, ...]:
         """Why simulations failed, by cause."""
         return failures(sorted(self._failed.items()))
@@ -100,9 +105,8 @@ class Summary:
                 self.spent += Spent.on_requests(exchange.requests, exchange.usage)
             case records.EndedRecord():
                 self.status, self.reason, self.spent = record.status, record.reason, record.spent
-                unjudged = mostly_unjudged([None if isnan(r) else r for r in self._robustness])
-                if record.status == "not falsified" and unjudged:  # as in the result
-                    self.status, self.reason = "failed", unjudged
+                if record.status == "not falsified" and self.unjudged:  # as in the result
+                    self.status, self.reason = "failed", self.unjudged
                 own = [found for name, found in record.findings.items() if self.recorded_as in (None, name)]
                 self.findings = tuple(each for found in own for each in found)
 

@@ -19,7 +19,7 @@ from falsifier.record import manifest
 from falsifier.search.budget import Spent
 from falsifier.search.findings import Finding
 from falsifier.search.parameterization import parameterization_note, parameterization_of
-from falsifier.search.result import Result
+from falsifier.search.result import Result, mostly_unjudged
 from falsifier.stl import Verdict, parse
 from falsifier.stl.margins import margin_words, shown, signed
 
@@ -237,7 +237,7 @@ def assurance_json(found: Assurance) -> dict[str, Any]:
 
 def _can_continue(result: Result) -> bool:
     if result.status == "failed":
-        return 0 < len(result.evaluations) >= 2 * sum(failure.count for failure in result.failures)
+        return bool(result.evaluations) and not mostly_unjudged([e.robustness for e in result.evaluations])
     return result.status == "interrupted"
 
 

@@ -178,6 +178,10 @@ def test_watch_follows_single_runs_too(command: Any, tmp_path: Path) -> None:
 def test_watch_continues_nothing_that_most_failed_simulations_have_ended(command: Any) -> None:
     falsify(lag_problem(response=mostly_broken), "uniform", budget=20, directory="r")
     assert "failed after 20 simulations" in (out := command("watch", "r").stdout) and "stopped" not in out
+    never = lag_problem("G (1/(x-x) <= 50)", name="never judged")
+    falsify([lag_problem("G (x <= 99)"), never], "uniform", budget=3, directory="s")
+    out = command("watch", "s").stdout
+    assert "3 of 3 simulations could not be judged" in out and "stopped" not in out
 
 
 def test_watch_ends_where_nobody_works_on(command: Any, tmp_path: Path) -> None:

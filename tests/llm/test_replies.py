@@ -223,6 +223,10 @@ class TestSampleToReferTo:
         with pytest.raises(RejectedReplyError, match=told):
             self.form().read(json.dumps({"as_in": as_in, "signals": GOOD["signals"]}))
 
+    def test_if_nothing_is_left_out_the_number_does_not_matter(self) -> None:
+        complete = (json.dumps(GOOD | {"as_in": number}) for number in (0, 3))
+        assert len({candidate.key for text in complete for candidate in self.form().read(text)}) == 1
+
     def test_schema(self) -> None:
         schema = self.form().schema()
         strict_subset(schema)

@@ -36,7 +36,9 @@ class Combinations:
             self._times[name].update(dict(zip(values.tolist(), counts.tolist(), strict=True)))
         self._left = [n for n in columns if self._has_few_whole_values(n)]
         if self._left:
-            states = np.unique(np.stack([columns[n] for n in self._left]), axis=1).tolist()
+            rows = np.stack([columns[n] for n in self._left])
+            begun = np.append(True, (np.diff(rows, axis=1) != 0).any(axis=0))
+            states = np.unique(rows[:, begun], axis=1).tolist()
             for (one, these), (two, those) in combinations(zip(self._left, states, strict=True), 2):
                 self._seen[one, two].update(zip(these, those, strict=True))
 

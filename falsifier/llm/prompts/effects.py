@@ -14,7 +14,8 @@ from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import coarse_clock, plain
 from falsifier.llm.prompts.view import View
 
-# Equal parts of a simulation that are compared, parts without effect from which on it is told, samples told.
+# Equal parts of a simulation that are compared, or each time of fewer; parts without effect from which on it
+# is told, samples told.
 _PARTS, _LONG, _MOST_TOLD = 100, 5, 3
 # Samples and names that are listed.
 _MOST_LISTED = 6
@@ -50,7 +51,7 @@ class Effects:
         inputs = [r.name for r in self.view.space.inputs]
         if not self.view.recorded or not inside.columns.keys() >= {*inputs, *self.view.recorded}:
             return
-        edges = np.linspace(0, len(inside), _PARTS + 1).round().astype(int)
+        edges = np.linspace(0, len(inside), min(_PARTS, len(inside)) + 1).round().astype(int)
         clock = coarse_clock(self.view.space.stop_time)
         self._ends = [plain(t, clock) for t in inside.times[np.maximum(edges - 1, 0)].tolist()]
         recorded = np.stack([inside[name] for name in self.view.recorded], axis=1)

@@ -4,8 +4,8 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from itertools import chain, islice
-from math import inf
+from itertools import chain, islice, pairwise
+from math import inf, nan
 
 import numpy as np
 
@@ -57,7 +57,7 @@ class Regularities:
     """Collects what was so when discrete signals changed, and others jumped."""
 
     view: View
-    # What is looked at of a sample: at all times, and for times since, when anything was switched.
+    # What is looked at of a sample: at all times, and for times unchanged, when anything was switched.
     _known: list[Array] = field(default_factory=list)
     _switched: list[Array] = field(default_factory=list)
     _levels: defaultdict[str, set[float]] = field(default_factory=lambda: defaultdict(set))
@@ -80,17 +80,17 @@ class Regularities:
         unchanged = times - np.roll(times[since], 1, axis=1)
         unchanged[:, 0] = 0.0
         before, first = np.roll(values, 1, axis=1), len(self._names) - len(self._inputs)
-        age = times - times[since[first:]]
-        known = np.vstack((values, values[first:], age))
-        self._known.append(known[:, :: max(1, len(inside) // _TIMES)])
+        switched = changed[first:].copy()
+        switched[:, 1:] |= changed[first:, :-1]  # times are that accurate
+        some = slice(None, None, max(1, len(times) // _TIMES))
+        self._known.append(np.vstack((values[:, some], values[first:, some], switched[:, some])))
         discrete = self.view.discrete(inside)
         is_switched = [
             n in discrete or (k >= first and changed[k].mean() < _SELDOM) for k, n in enumerate(self._names)
         ]
         at = np.flatnonzero(changed[is_switched].any(axis=0))
         self._switched.append(unchanged[:, at[:: max(1, len(at) // _TIMES)]])
-        then = np.vstack((before[:first], values[first:], before[first:], age, unchanged, times))
-        rows = then.T + 0.0  # there are two zeros, with other bytes
+        then = np.vstack((before[:first], values[first:], before[first:], switched, unchanged, times))
         for place, name in enumerate(self._recorded):
             column = inside[name]
             if name in discrete:
@@ -108,22 +108,22 @@ class Regularities:
                 pairs = list(zip(column[at - 1].tolist(), column[at].tolist(), strict=True))
                 ends = {v: value_text(self.view, name, v) for v in {*chain(*pairs)} if not change}
                 self._levels[name].update(ends)
-                for (old, new), row in zip(pairs, rows[at], strict=True):
+                rows = then[:, at].T + 0.0  # there are two zeros, with other bytes
+                for (old, new), row in zip(pairs, rows, strict=True):
                     told = change or f"{ends[old]} -> {ends[new]}"
                     self._seen[name][told, new > old][row.tobytes()] = None
 
     @property
     def text(self) -> str:
         """What was so each time, in a line for each change, those of the requirement's signals first."""
-        names = (n for n in self._recorded if n in self._seen and n not in self._chattering)
-        known = (
-            [*np.concatenate(self._known, axis=1), *np.concatenate(self._switched, axis=1)]
-            if self._known
-            else []
-        )
-        lines = [line for name in names for line in self._of(name, known)]
-        lines.sort(key=lambda line: f" {_JUMPS} " in line or f" {_STARTS} " in line)
-        return "\n".join((_HEAD, *lines[:_MOST_TOLD])) if lines else ""
+        names = [n for n in self._recorded if n in self._seen and n not in self._chattering]
+        if not names:
+            return ""
+        known = [row for parts in (self._known, self._switched) for row in np.concatenate(parts, axis=1)]
+        usual = [(row, float(np.ptp(row)) if row.size else nan) for row in known]
+        found = (line for name in sorted(names, key=self._is_real) for line in self._of(name, usual))
+        lines = [*islice(found, _MOST_TOLD)]
+        return "\n".join((_HEAD, *lines)) if lines else ""
 
     @cached_property
     def _recorded(self) -> tuple[str, ...]:
@@ -147,10 +147,12 @@ class Regularities:
         forms = ((names, _VALUE), (inputs, _UNTIL), (inputs, _SWITCHED), (names, _UNCHANGED))
         return tuple((name, form) for names, form in forms for name in names)
 
-    def _of(self, name: str, known: Sequence[Array]) -> Iterator[str]:
-        counts = len(self._levels[name]) >= _COUNTS
-        # It may have looked discrete in other samples.
-        is_real = any(change in (_JUMPS, _STARTS) for change, _ in self._seen[name])
+    def _is_real(self, name: str) -> bool:
+        """Whether a signal jumped or started; it may have looked discrete in other samples."""
+        return any(change in (_JUMPS, _STARTS) for change, _ in self._seen[name])
+
+    def _of(self, name: str, known: Sequence[tuple[Array, float]]) -> Iterator[str]:
+        counts, is_real = len(self._levels[name]) >= _COUNTS, self._is_real(name)
         changes: defaultdict[str, dict[bytes, None]] = defaultdict(dict)
         for (change, is_up), found in self._seen[name].items():
             way = "up" if is_up else "down"
@@ -162,15 +164,17 @@ class Regularities:
             if so := self._common(seen.T, known, without="" if is_real else name):
                 yield f"- {name} {change}, {len(seen)} times: {', '.join(so[:_MOST_CONDITIONS])}"
 
-    def _common(self, seen: Array, known: Sequence[Array], *, without: str) -> list[str]:
+    def _common(self, seen: Array, known: Sequence[tuple[Array, float]], *, without: str) -> list[str]:
         """What was in a narrow range each time, and seldom is, the most telling first, times at the end.
 
-        ``seen`` has what is looked at then, ``known`` what it is otherwise, one row for each.
+        ``seen`` has what is looked at then, ``known`` what it is otherwise and the span of that, one row for
+        each.
         """
         found = dict[tuple[int, str], tuple[float, float, str]]()
-        for (name, form), values, usual in zip(self._told, seen, known, strict=True):
+        for (name, form), values, (usual, span) in zip(self._told, seen, known, strict=True):
             kind = _ORDER.index(_VALUE if form == _UNTIL else form)
-            ranges = [] if name == without and kind == 1 else self._ranges(form, values, usual)
+            is_told = usual.size and not (name == without and kind == 1)
+            ranges = self._ranges(form, values, span) if is_told else []
             share = float(sum(((usual >= low) & (usual <= high)).mean() for low, high in ranges))
             # The first time in each range says where it is.
             by_chance = len(self._told) * share ** (len(values) - len(ranges))
@@ -183,29 +187,29 @@ class Regularities:
             ends = (dict.fromkeys(told(v, column_decimals(usual)) for v in one) for one in ranges)
             text = form.format(name=name, values=" or ".join(map(" to ".join, ends)))
             found[kind, name] = share, width, text
-        if own := found.pop(
-            (2, without), None
-        ):  # it is a time limit, and what others had since then is chance
+        # How long it had its own value is a time limit, and how long others had theirs since then is chance.
+        if own := found.pop((2, without), None):
             is_timer = not any(kind == 0 for kind, _ in found)
             found = {key: each for key, each in found.items() if key[0] < 2}
             found |= {(2, without): own} if is_timer else {}
         return [text for *_, text in sorted((kind, *each) for (kind, _), each in found.items())]
 
-    def _ranges(self, form: str, values: Array, usual: Array) -> list[tuple[float, float]]:
+    def _ranges(self, form: str, values: Array, span: float) -> list[tuple[float, float]]:
         """The narrow ranges in which what is looked at was each time, if there are."""
-        step = self.view.experiment.output_interval
         if form == _SWITCHED:
-            return [(0.0, 1.5 * step)] if values.max() <= 1.5 * step else []
+            return [(1.0, 1.0)] if values.all() else []
         if form != _UNCHANGED:
-            return _ranges(values, float(np.ptp(usual)))
+            return _ranges(values, span)
+        step = self.view.experiment.output_interval
         return _ranges(values, max(float(values.max()), _STEPS * step)) if values.min() >= 2 * step else []
 
 
 def _ranges(values: Array, span: float) -> list[tuple[float, float]]:
     """The narrow range in which values are, as those of a threshold; or two, as those of two; else none."""
     ordered = np.sort(values)
-    parts = [ordered]
-    if np.ptp(ordered) > _NARROW * span:
-        parts = np.split(ordered, [int(np.diff(ordered).argmax()) + 1])
-    is_narrow = sum(map(np.ptp, parts)) <= _NARROW * span and min(map(len, parts)) >= len(parts)
-    return [(float(part[0]), float(part[-1])) for part in parts] if is_narrow else []
+    edges = [0, len(ordered)]
+    if ordered[-1] - ordered[0] > _NARROW * span:
+        edges.insert(1, int(np.diff(ordered).argmax()) + 1)
+    found = [(float(ordered[begin]), float(ordered[end - 1])) for begin, end in pairwise(edges)]
+    is_narrow = sum(high - low for low, high in found) <= _NARROW * span
+    return found if is_narrow and min(np.diff(edges)) >= len(found) else []

@@ -34,7 +34,7 @@ class Tried:
 
     view: View
     _values: dict[str, set[float]] = field(default_factory=dict)
-    _longest: dict[tuple[str, float], float] = field(default_factory=dict)  # stay in s of an input at a value
+    _longest: dict[str, dict[float, float]] = field(default_factory=dict)  # stay in s of an input at a value
 
     def add(self, candidate: Candidate) -> None:
         """Add a sample."""
@@ -43,8 +43,9 @@ class Tried:
             if signal.interpolation != "constant":  # it passes through all between the least and the greatest
                 values = np.linspace(min(values), max(values), _VALUES).tolist()
             self._values.setdefault(name, set()).update(values)
+            longest = self._longest.setdefault(name, {})
             for value, stay in _stays(signal, self.view.space.stop_time):
-                self._longest[name, value] = max(stay, self._longest.get((name, value), 0.0))
+                longest[value] = max(stay, longest.get(value, 0.0))
         for name, value in candidate.parameters.items():
             self._values.setdefault(name, set()).add(value)
 
@@ -77,7 +78,7 @@ class Tried:
         """Values at which an input that may stay at one never stayed for long."""
         if not (r.free or (r.interpolation == "constant" and r.control_points > 1)):
             return ""
-        stays = {value: stay for (name, value), stay in self._longest.items() if name == r.name}
+        stays = self._longest.get(r.name, {})
         if r.kind == "real":
             return self._short_between(r, {v: stay for v, stay in stays.items() if r.low < v < r.high})
         at = {stay: [str(int(v)) for v, s in sorted(stays.items()) if s == stay] for stay in stays.values()}

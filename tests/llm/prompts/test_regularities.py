@@ -101,3 +101,21 @@ def test_a_real_signal_that_is_discrete_in_some_samples_only_jumps_in_all() -> N
         seen.add(Trajectory(times, {"x": np.where(times > start, end, 0.0), "u": times - start}))
     assert "signals just before each change" in seen.text
     assert [*seen.text.splitlines()[1:]] == ["- x jumps up, 4 times: u 0.1"]
+
+
+def test_an_input_at_the_start_was_not_just_switched_and_little_of_a_sample_is_kept() -> None:
+    view = View.of(lag_problem("G (x <= 0.9)"))
+    seen = Regularities(replace(view, info=ModelInfo("m", variables=(Variable("x", kind="integer"),))))
+    times = np.linspace(0.0, 10.0, 1001)
+    for k in range(4):
+        u = np.where(times > k + 1, 1.0, k / 4)
+        seen.add(Trajectory(times, {"x": np.where(times > 0, 1.0, 0.0), "u": u}))
+    assert seen.text == ""
+    assert all(kept.base is None for kept in seen._known), "a part that refers to the whole keeps that"
+
+
+def test_durations_are_not_told_where_nothing_else_was_switched() -> None:
+    seen, times = Regularities(View.of(lag_problem("G (x <= 0.9)"))), np.linspace(0.0, 10.0, 101)
+    for k in range(3):
+        seen.add(Trajectory(times, {"x": np.maximum(times - 2, 0.0), "u": times * (k - 1)}))
+    assert seen.text == ""
