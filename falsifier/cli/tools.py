@@ -28,9 +28,10 @@ from falsifier.errors import JournalError, SpecError
 from falsifier.fmu.build import compile_sources
 from falsifier.problem.spec import Spec
 from falsifier.record.files import set_aside
-from falsifier.record.journal import repair as repair_run, simulated
+from falsifier.record.journal import simulated
 from falsifier.record.manifest import MANIFEST, Manifest
 from falsifier.record.records import RECORDS
+from falsifier.record.repair import repair as repair_run
 from falsifier.stl.margins import signed
 from falsifier.views.terminal import warn
 

@@ -20,7 +20,8 @@ from falsifier.counterexamples.store import FILE_NAME, load_counterexample, save
 from falsifier.errors import FalsifierError, JournalError, SpecError
 from falsifier.llm.messages import ChatRequest
 from falsifier.llm.scripted import ScriptedChat
-from falsifier.record.journal import repair, run_lock
+from falsifier.record.journal import run_lock
+from falsifier.record.repair import repair
 from falsifier.record.run import falsify, resume
 from falsifier.search.result import Result
 from falsifier.testing import lag_problem

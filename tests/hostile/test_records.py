@@ -23,8 +23,8 @@ from falsifier.counterexamples.store import FILE_NAME, save, to_store
 from falsifier.errors import ChatSetupError, JournalError
 from falsifier.problem.loading import load_problem
 from falsifier.problem.source import ProblemSource
-from falsifier.record.journal import repair
 from falsifier.record.manifest import environment
+from falsifier.record.repair import repair
 from falsifier.record.run import falsify, resume
 from falsifier.search.budget import Budget
 from falsifier.search.make_engines import check_llm, note_llm

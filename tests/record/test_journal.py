@@ -18,6 +18,7 @@ from falsifier.errors import JournalError, MachineError
 from falsifier.record import journal
 from falsifier.record.files import is_locked, recorded_trajectory, set_aside
 from falsifier.record.records import Record, line_of
+from falsifier.record.repair import repair
 from falsifier.record.run import falsify
 from falsifier.search.budget import Spent
 from falsifier.search.result import Result
@@ -197,7 +198,7 @@ def test_a_trajectory_that_is_damaged_is_told_once(
 def test_a_run_that_is_being_written_is_left_alone(tmp_path: Path) -> None:
     Standing().run(tmp_path)
     with journal.open_journal(tmp_path), pytest.raises(JournalError, match="another process is writing"):
-        journal.repair(tmp_path)
+        repair(tmp_path)
 
 
 def test_what_is_set_aside_replaces_nothing(tmp_path: Path) -> None:
