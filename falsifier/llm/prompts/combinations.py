@@ -51,11 +51,14 @@ class Combinations:
 
     @property
     def text(self) -> str:
-        """Those that would have been there the most often if signals had nothing to do with each other."""
-        found = sorted(self._never(), reverse=True)[:_MOST_TOLD]
-        return f"Never at one time so far: {'; '.join(text for _, text in found)}." if found else ""
+        """Those with inputs, which can be tried, then others; the likeliest ones first.
 
-    def _never(self) -> Iterator[tuple[float, str]]:
+        That is, if signals had nothing to do with each other.
+        """
+        found = sorted(self._never(), reverse=True)[:_MOST_TOLD]
+        return f"Never at one time so far: {'; '.join(text for *_, text in found)}." if found else ""
+
+    def _never(self) -> Iterator[tuple[bool, float, str]]:
         searched, few = self.view.space.names, self._times
         for one, two in combinations(self._left or (), 2):
             if one in searched and two in searched:
@@ -65,7 +68,11 @@ class Combinations:
                 if others := [b for b in sorted(few[two]) if (a, b) not in seen]:
                     expected = few[one][a] * sum(few[two][b] for b in others) / all_times
                     told = ", ".join(value_text(self.view, two, b) for b in others)
-                    yield expected, f"{one} {value_text(self.view, one, a)} with {two} {told}"
+                    yield (
+                        two in searched,
+                        expected,
+                        f"{one} {value_text(self.view, one, a)} with {two} {told}",
+                    )
 
     def _has_few_whole_values(self, name: str) -> bool:
         values = self._times[name]

@@ -80,6 +80,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     reasons = tuple(_reasons(verdict, diagnosis, is_timed=is_timed))
     told_parts = tuple(_parts(view, diagnosis, over_time, is_timed=is_timed))
     parts = tuple(text for text, _ in told_parts)
+    line = line if is_timed else ""  # at no time more than at others
     there = (_values_at(view, trajectory, verdict.critical_time, verdict.robustness),) if is_timed else ()
     predicates = [
         *_predicates(view, diagnosis, trajectory, over_time),
@@ -96,7 +97,7 @@ def observed(view: View, evaluation: Evaluation) -> Observed:
     return Observed(
         (*reasons, *there, *parts, *discrete, *predicates, *over_all),
         (*reasons, *parts, *discrete, *predicates, *few_courses),
-        "; ".join((line, *(brief for _, brief in told_parts[:1]))),
+        "; ".join(filter(None, (line, *(brief for _, brief in told_parts[:1])))),
         Signs(
             is_timed=is_timed,
             failure=failure[1] - failure[0] if failure else 0.0,
@@ -160,7 +161,7 @@ def _nearest(view: View, trajectory: Trajectory, over_time: Mapping[Formula, Arr
     violation = Side(view.requirement.formula, must_hold=False)
     for met, missing, sample in near_misses(violation, trajectory.times, over_time):
         if all(_is_still(over_time[side.part]) for side in missing):
-            continue  # it is as near at all times
+            continue  # it is never nearer
         words = []
         for side in missing:
             gaps, found = asked_for(side, trajectory.times, over_time, np.array([sample]))
@@ -174,8 +175,8 @@ def _nearest(view: View, trajectory: Trajectory, over_time: Mapping[Formula, Arr
 
 
 def _is_still(column: Array) -> bool:
-    """Whether robustness is the same at several times, and asked for at no other."""
-    asked = column[~np.isnan(column)]
+    """Whether robustness is as far from 0 at all of several times, as that of a Boolean is."""
+    asked = np.abs(column[~np.isnan(column)])
     return len(asked) > 1 and float(np.ptp(asked)) == 0
 
 

@@ -75,8 +75,8 @@ _SHAPES = (
 )
 _JUMPS = (
     "{inputs} can only jump from value to value: what matters is the order of the values, when each begins "
-    "and how long it lasts. Try unusual orders, switching back, irregular times, and stays that are just "
-    "too short or too long for what the system does meanwhile."
+    "and how long it lasts. Try stays at each value for most of the time, or just too short for what the "
+    "system does meanwhile, unusual orders, switching back, and irregular times."
 )
 
 _JSON = "Reply with one JSON object{many} in this form, with one or two sentences of rationale:"

@@ -81,11 +81,13 @@ class Tried:
         stays = self._longest.get(r.name, {})
         if r.kind == "real":
             return self._short_between(r, {v: stay for v, stay in stays.items() if r.low < v < r.high})
+        stop_time, is_few = self.view.space.stop_time, len(r.numbers) <= _FEW
         at = {stay: [str(int(v)) for v, s in sorted(stays.items()) if s == stay] for stay in stays.values()}
+        whole = f" of {number(stop_time, _DIGITS + 1)} s" if is_few else ""
         told = (
-            f"at {', '.join(values[:_MOST_LISTED])} for more than {number(stay, _DIGITS + 1)} s"
+            f"at {', '.join(values[:_MOST_LISTED])} for more than {number(stay, _DIGITS + 1)} s{whole}"
             for stay, values in sorted(at.items())
-            if 0 < stay < (_LONG_OF_FEW if len(r.numbers) <= _FEW else _LONG) * self.view.space.stop_time
+            if 0 < stay < (_LONG_OF_FEW if is_few else _LONG) * stop_time
         )
         return ", ".join(told)
 
