@@ -10,8 +10,8 @@ import numpy as np
 from falsifier.core.candidate import Candidate
 from falsifier.core.ranges import InputRange, Range
 from falsifier.core.signals import Signal
-from falsifier.core.words import listed
-from falsifier.llm.prompts.numbers import bounds, number
+from falsifier.core.words import listed, readable
+from falsifier.llm.prompts.numbers import bounds
 from falsifier.llm.prompts.view import View
 
 # Share of a range that is told if no sample had a value in it.
@@ -83,9 +83,9 @@ class Tried:
             return self._short_between(r, {v: stay for v, stay in stays.items() if r.low < v < r.high})
         stop_time, is_few = self.view.space.stop_time, len(r.numbers) <= _FEW
         at = {stay: [str(int(v)) for v, s in sorted(stays.items()) if s == stay] for stay in stays.values()}
-        whole = f" of {number(stop_time, _DIGITS + 1)} s" if is_few else ""
+        whole = f" of {readable(stop_time, _DIGITS + 1)} s" if is_few else ""
         told = (
-            f"at {', '.join(values[:_MOST_LISTED])} for more than {number(stay, _DIGITS + 1)} s{whole}"
+            f"at {', '.join(values[:_MOST_LISTED])} for more than {_rounded_up(stay)} s{whole}"
             for stay, values in sorted(at.items())
             if 0 < stay < (_LONG_OF_FEW if is_few else _LONG) * stop_time
         )
@@ -97,7 +97,7 @@ class Tried:
         if not longest:
             return ""
         if longest < _LONG * stop_time:
-            return f"at a value between its limits for more than {number(longest, _DIGITS + 1)} s"
+            return f"at a value between its limits for more than {_rounded_up(longest)} s"
         in_part = np.zeros(_PARTS)
         for value, stay in stays.items():
             part = min(int(r.share_of(value) * _PARTS), _PARTS - 1)
@@ -107,9 +107,15 @@ class Tried:
         for run in runs:
             begin, end = bounds(r.at(int(run[0]) / _PARTS), r.at((int(run[-1]) + 1) / _PARTS), _DIGITS)
             most = float(in_part[run].max())
-            beyond = f" for more than {number(most, _DIGITS + 1)} s" if most else ""
+            beyond = f" for more than {_rounded_up(most)} s" if most else ""
             told.append(f"{'' if most else 'constant '}between {begin} and {end}{beyond}")
         return ", ".join(told)
+
+
+def _rounded_up(stay: float) -> str:
+    """A time in s that no stay exceeds, in few digits."""
+    text = readable(stay, _DIGITS + 1)
+    return text if float(text) >= stay else readable(stay * 1.005, _DIGITS + 1)
 
 
 def _alike(ranges: Sequence[T], of: Callable[[T], str]) -> list[str]:

@@ -432,7 +432,7 @@ def test_values_at_which_an_input_stayed_shortly_are_told() -> None:
 
     def add(on: Sequence[float], u: Sequence[float], interpolation: Interpolation = "constant") -> None:
         signals = {
-            "on": Signal((0.0, 2.5, 5.0, 6.0), tuple(on), "constant"),
+            "on": Signal((0.0, 2.496, 5.0, 6.0), tuple(on), "constant"),
             "v": Signal((0.0, 10.0), (0.0, 1.0), "linear"),
         }
         signals["u"] = Signal((0.0, 1.0, 3.0, 4.0), tuple(u), interpolation)
@@ -440,7 +440,7 @@ def test_values_at_which_an_input_stayed_shortly_are_told() -> None:
 
     add((1, 0, 1, 1), (0.0, 0.5, 0.5, 1.0), "linear")
     assert (
-        "on at 0 for more than 2.5 s of 10 s, at 1 for more than 5 s of 10 s; u at a value between its limits"
+        "on at 0 for more than 2.52 s of 10 s, at 1 for more than 5 s of 10 s; u at a value between its limits"
         in tried.gaps
     )
     add((0, 0, 0, 0), (0.4, 0.5, 0.5, 0.5))
