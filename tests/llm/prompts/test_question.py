@@ -439,10 +439,7 @@ def test_values_at_which_an_input_stayed_shortly_are_told() -> None:
         tried.add(Candidate(signals))
 
     add((1, 0, 1, 1), (0.0, 0.5, 0.5, 1.0), "linear")
-    assert (
-        "on at 0 for more than 2.52 s of 10 s, at 1 for more than 5 s of 10 s; u at a value between its limits"
-        in tried.gaps
-    )
+    assert "on at 0 for more than 2.52 s of 10 s, at 1 for more than 5 s of 10 s; u at a value" in tried.gaps
     add((0, 0, 0, 0), (0.4, 0.5, 0.5, 0.5))
     add((1, 1, 1, 1), (0.15, 0.05, 0.35, 0.65))
     assert tried.gaps == "u constant between 0.2 and 0.3, constant between 0.7 and 1"
