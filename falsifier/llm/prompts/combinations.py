@@ -68,11 +68,8 @@ class Combinations:
                 if others := [b for b in sorted(few[two]) if (a, b) not in seen]:
                     expected = few[one][a] * sum(few[two][b] for b in others) / all_times
                     told = ", ".join(value_text(self.view, two, b) for b in others)
-                    yield (
-                        two in searched,
-                        expected,
-                        f"{one} {value_text(self.view, one, a)} with {two} {told}",
-                    )
+                    text = f"{one} {value_text(self.view, one, a)} with {two} {told}"
+                    yield two in searched, expected, text
 
     def _has_few_whole_values(self, name: str) -> bool:
         values = self._times[name]

@@ -1,6 +1,6 @@
 """What had no effect: samples whose signals are the same for some time after what is chosen differed."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from zlib import crc32
 
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from falsifier.core.candidate import Candidate
 from falsifier.core.trajectory import Trajectory
-from falsifier.core.words import first_few, listed
+from falsifier.core.words import first_few
 from falsifier.llm.prompts.courses import Array
 from falsifier.llm.prompts.numbers import coarse_clock, plain
 from falsifier.llm.prompts.view import View
@@ -78,20 +78,13 @@ class Effects:
         """In which samples what was chosen had no effect for the longest time; empty if in none."""
         longest = sorted(self._alike.values(), key=lambda a: a.begin - a.end)[:_MOST_TOLD]
         told = (
-            f"samples {_few([*map(str, a.numbers)])} until {self._ends[a.end]} s, though "
-            f"{_few([name for name in self.view.space.names if name in a.differing])} differed from "
-            f"about {self._ends[a.begin]} s on"
+            f"samples {first_few([*map(str, a.numbers)], _MOST_LISTED)} until {self._ends[a.end]} s, though "
+            f"{first_few([n for n in self.view.space.names if n in a.differing], _MOST_LISTED)} differed "
+            f"from about {self._ends[a.begin]} s on"
             for a in longest
         )
-        return (
-            f"Without effect so far: all recorded signals were the same in {'; '.join(told)}."
-            if longest
-            else ""
-        )
-
-
-def _few(names: Sequence[str]) -> str:
-    return listed(names) if len(names) <= _MOST_LISTED else first_few(names, _MOST_LISTED)
+        so_far = "Without effect so far: all recorded signals were the same in "
+        return f"{so_far}{'; '.join(told)}." if longest else ""
 
 
 def _checksums(parts: Iterable[Array]) -> list[int]:

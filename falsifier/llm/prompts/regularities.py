@@ -199,12 +199,14 @@ class Regularities:
         if form == _SWITCHED:
             return [(1.0, 1.0)] if values.all() else []
         if form != _UNCHANGED:
-            return _ranges(values, span)
+            return _narrow_ranges(values, span)
         step = self.view.experiment.output_interval
-        return _ranges(values, max(float(values.max()), _STEPS * step)) if values.min() >= 2 * step else []
+        if values.min() < 2 * step:
+            return []
+        return _narrow_ranges(values, max(float(values.max()), _STEPS * step))
 
 
-def _ranges(values: Array, span: float) -> list[tuple[float, float]]:
+def _narrow_ranges(values: Array, span: float) -> list[tuple[float, float]]:
     """The narrow range in which values are, as those of a threshold; or two, as those of two; else none."""
     ordered = np.sort(values)
     edges = [0, len(ordered)]

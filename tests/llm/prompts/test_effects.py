@@ -23,11 +23,11 @@ def told(*samples: tuple[float, float, float], times: Array = TIMES) -> str:
 
 def test_a_delay_and_what_never_matters_are_told_with_the_samples_that_show_it() -> None:
     assert told((2.0, 4.0, 0.0), (3.0, 5.0, 0.0)) == (
-        "samples 1 and 2 until 3.99 s, though u differed from about 2.09 s on."
+        "samples 1, 2 until 3.99 s, though u differed from about 2.09 s on."
     )
     (alike, later) = told(*[(2.0 + k, 11.0, k / 4) for k in range(3)], (2.0, 9.0, 0.5)).split("; ")
-    assert alike == "samples 1, 2 and 3 until 10 s, though u and x0 differed from about 0 s on"
-    assert later == "samples 1 and 4 until 9 s, though x0 differed from about 0 s on."
+    assert alike == "samples 1, 2, 3 until 10 s, though u, x0 differed from about 0 s on"
+    assert later == "samples 1, 4 until 9 s, though x0 differed from about 0 s on."
 
 
 def test_nothing_is_told_where_signals_differ_as_soon_as_inputs_do() -> None:
